@@ -1,0 +1,35 @@
+# How everything is compiled, and the two functions with which each folder says what it holds.
+
+# No contraction into fused multiply-adds (accuracy.md, section 4): the bits must not depend on the CPU. No -ffast-math.
+add_library(rasterbench_options INTERFACE)
+target_include_directories(rasterbench_options INTERFACE ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR}/generated)
+target_compile_options(rasterbench_options INTERFACE
+  -ffp-contract=off -Wall -Wextra -Wconversion -Wshadow -Wpedantic
+  $<$<BOOL:${RASTERBENCH_WERROR}>:-Werror>)
+target_link_libraries(rasterbench_options INTERFACE fmt::fmt Threads::Threads)
+if(RASTERBENCH_SANITIZE)
+  target_compile_options(rasterbench_options INTERFACE
+    -fsanitize=${RASTERBENCH_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  target_link_options(rasterbench_options INTERFACE -fsanitize=${RASTERBENCH_SANITIZE})
+endif()
+
+# What -march=native is compiled with is not what the check of the CPU may be compiled with: see harness/cpu_check.
+add_library(rasterbench_native INTERFACE)
+if(RASTERBENCH_NATIVE)
+  target_compile_options(rasterbench_native INTERFACE -march=native)
+endif()
+
+# rasterbench_library(NAME sources...): the objects of a folder. Objects, not an archive: kernels, schedules and
+# generators register themselves from namespace scope, and a linker drops archive members that nobody names.
+function(rasterbench_library name)
+  add_library(${name} OBJECT ${ARGN})
+  target_link_libraries(${name} PUBLIC rasterbench_options rasterbench_native)
+endfunction()
+
+# rasterbench_test(FOLDER sources... LIBRARIES folders...): FOLDER_test, the unit tests that sit beside the sources.
+function(rasterbench_test folder)
+  cmake_parse_arguments(ARG "" "" "LIBRARIES" ${ARGN})
+  add_executable(${folder}_test ${ARG_UNPARSED_ARGUMENTS})
+  target_link_libraries(${folder}_test PRIVATE ${ARG_LIBRARIES} GTest::gtest_main)
+  gtest_discover_tests(${folder}_test TEST_PREFIX "${folder}." DISCOVERY_TIMEOUT 60)
+endfunction()
