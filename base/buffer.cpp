@@ -45,8 +45,8 @@ std::size_t checked_bytes(std::size_t count, std::size_t size, const std::string
   const double wanted = static_cast<double>(count) * static_cast<double>(size);
   const std::size_t available = available_memory();
   if (wanted > static_cast<double>(available))
-    throw InputError(fmt::format("{} needs {:.1f} GiB of memory, {:.1f} GiB are available", what, wanted / kGiB,
-                                 static_cast<double>(available) / kGiB));
+    throw InputError(fmt::format("{} needs {:.1f} GiB of memory, {:.1f} GiB are available", what,
+                                 wanted / kGiB, static_cast<double>(available) / kGiB));
   return count * size;
 }
 

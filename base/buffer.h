@@ -12,11 +12,13 @@ namespace rasterbench {
 /// Bytes of memory that this process could still use (MemAvailable and the cgroup's limit).
 std::size_t available_memory();
 
-/// count * size, checked. Throws InputError "WHAT needs ... GiB, ... GiB are available" when it overflows or when the
-/// machine does not have that much, so that a huge image is refused instead of killing the process half-way.
+/// count * size, checked. Throws InputError "WHAT needs ... GiB, ... GiB are available" when it overflows or
+/// when the machine does not have that much, so that a huge image is refused instead of killing the process
+/// half-way.
 std::size_t checked_bytes(std::size_t count, std::size_t size, const std::string& what);
 
-/// Anonymous pages straight from the kernel: zero, and placed on the NUMA node of the thread that touches them first.
+/// Anonymous pages straight from the kernel: zero, and placed on the NUMA node of the thread that touches
+/// them first.
 void* map_pages(std::size_t bytes, const std::string& what);
 void unmap_pages(void* pages, std::size_t bytes) noexcept;
 
@@ -31,7 +33,8 @@ class Buffer {
   Buffer(std::size_t size, const std::string& what) : size_(size) {
     if (size_ > 0) data_ = static_cast<T*>(map_pages(checked_bytes(size_, sizeof(T), what), what));
   }
-  Buffer(Buffer&& other) noexcept : data_(std::exchange(other.data_, nullptr)), size_(std::exchange(other.size_, 0)) {}
+  Buffer(Buffer&& other) noexcept
+      : data_(std::exchange(other.data_, nullptr)), size_(std::exchange(other.size_, 0)) {}
   Buffer& operator=(Buffer&& other) noexcept {
     std::swap(data_, other.data_);
     std::swap(size_, other.size_);
@@ -41,6 +44,11 @@ class Buffer {
   Buffer& operator=(const Buffer&) = delete;
   ~Buffer() {
     if (data_) unmap_pages(data_, size_ * sizeof(T));
+  }
+
+  /// Makes room for `size` elements; what was there is lost when it has to grow.
+  void require(std::size_t size, const std::string& what) {
+    if (size > size_) *this = Buffer(size, what);
   }
 
   T* data() { return data_; }

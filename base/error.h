@@ -8,7 +8,8 @@
 
 namespace rasterbench {
 
-/// The root of everything that rasterbench throws on purpose. main prints what() on one line and exits with exit_code().
+/// The root of everything that rasterbench throws on purpose. main prints what() on one line and exits with
+/// exit_code().
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -17,10 +18,10 @@ class Error : public std::runtime_error {
 
 /// Where in an input an error was found: what is empty is not printed.
 struct Place {
-  std::string file;                        ///< path, option ("--size") or environment variable
-  std::optional<std::int64_t> line;        ///< 1-based line of a text file
-  std::optional<std::int64_t> byte;        ///< 0-based offset into a binary file
-  std::string field;                       ///< name of the value, e.g. "theta"
+  std::string file = {};                  ///< path, option ("--size") or environment variable
+  std::optional<std::int64_t> line = {};  ///< 1-based line of a text file
+  std::optional<std::int64_t> byte = {};  ///< 0-based offset into a binary file
+  std::string field = {};                 ///< name of the value, e.g. "theta"
 };
 
 /// Bad input or usage (a file, an option, the environment): exit code 2.

@@ -20,15 +20,16 @@ enum class TieRule {
 /// What geometry does to points in front of the near plane.
 enum class NearRule {
   kClip,  ///< triangles are cut at the near plane
-  kOff,   ///< the literal step list of the course text: no cut; a triangle with a corner at w <= 0 draws nothing
+  kOff,   ///< the literal step list of the course text: no cut; a triangle with a corner at w <= 0 draws
+          ///< nothing
 };
 
 /// All guard-banded screen coordinates are within +-kGuardBand pixels.
 inline constexpr double kGuardBand = 131072.0;  // 2^17
 
-/// A triangle after view, clipping and projection: x to the right and y down, in pixels, sample (j, i) at (j+.5, i+.5);
-/// d the depth, -1 on the near and +1 on the far plane. id is the world triangle's, shared by all pieces of a clipped one;
-/// id < 0 marks a slot of a triangle that draws nothing.
+/// A triangle after view, clipping and projection: x to the right and y down, in pixels, sample (j, i) at
+/// (j+.5, i+.5); d the depth, -1 on the near and +1 on the far plane. id is the world triangle's, shared by
+/// all pieces of a clipped one; id < 0 marks a slot of a triangle that draws nothing.
 template <class Real>
 struct ScreenTriangle {
   Real x[3], y[3], d[3];

@@ -1,5 +1,6 @@
-// An independent renderer: serial, double precision, by ray-plane intersection in homogeneous coordinates. Deliberately
-// simple; shares nothing with the kernels beyond the input types.
+// The independent answer that every benchmark point is judged by: a serial renderer in double precision that
+// shares nothing with the kernels beyond the input types, and a comparison that knows how far a numeric mode
+// may stray from it.
 #pragma once
 
 #include <cstdint>
@@ -20,32 +21,42 @@ struct IdImage {
   std::vector<double> depths;     ///< width * height
 };
 
-/// Draws `triangles` (id = index, smallest id wins a tie).
-IdImage render_in_double(std::span<const Triangle> triangles, const Camera& camera, FillRule fill, NearRule near_rule);
+/// Draws `triangles` (id = index, smallest id wins a tie in depth) by homogeneous rasterization: nothing is
+/// clipped, and coverage and depth come straight from the clip-space corners. A triangle with a non-finite
+/// corner or without area in the world draws nothing; back faces are drawn. Throws InputError if the picture
+/// does not fit into memory. Preconditions: triangles.size() <= kMaxTriangles, 1 <= camera.viewport.width,
+/// height <= kMaxImageSide.
+IdImage render_in_double(std::span<const Triangle> triangles, const Camera& camera, FillRule fill,
+                         NearRule near_rule);
 
-/// How far a numeric mode may stray from exact arithmetic, before any input is known.
+/// How far a numeric mode may stray from exact arithmetic, before any input is known. Its geometry is in
+/// double.
 struct ModeBound {
-  double vertex_unit;    ///< unit roundoff of the stored screen coordinates: 2^-24 or 2^-53
-  double snap;           ///< largest snap of a coordinate in pixels: 2^-9 for fixed_8, else 0
-  double edge_unit;      ///< unit roundoff of the edge functions: 2^-24, 2^-53, or 0 where they are exact integers
-  double depth_unit;     ///< unit roundoff of the depth interpolation
+  double vertex_unit;  ///< unit roundoff of the stored screen vertices: 2^-24 or 2^-53
+  double snap;         ///< largest snap of a coordinate in pixels: 2^-9 for fixed_8, else 0
+  double
+      edge_unit;  ///< unit roundoff of the edge functions (b-a)x(p-a): 2^-24, 2^-53, or 0 if exact integers
+  double depth_unit;  ///< unit roundoff of the depth interpolation d0 + gy dy + gx dx
 };
 
-/// How a picture differs from the double renderer's.
+/// How a picture differs from the double renderer's. Every pixel is in exactly one of the classes identical
+/// (unless its depth is out of bound), edge_ties, depth_ties and errors.
 struct Comparison {
   std::int64_t pixels = 0;
-  std::int64_t identical = 0;    ///< same id
-  std::int64_t edge_ties = 0;    ///< ids differ; a centre within the mode's bound of an edge explains it
-  std::int64_t depth_ties = 0;   ///< ids differ; a depth gap within the mode's bound explains it
-  std::int64_t errors = 0;       ///< ids differ and nothing explains it, or the depth of an equal id is out of bound
+  std::int64_t identical = 0;   ///< same id, and depth within the mode's bound
+  std::int64_t edge_ties = 0;   ///< ids differ; a centre within the mode's bound of an edge explains it
+  std::int64_t depth_ties = 0;  ///< ids differ; a depth gap within the mode's bound explains it
+  std::int64_t errors = 0;      ///< ids differ and nothing explains it, or the depth of an equal id is wrong
   double max_depth_error_steps = 0;  ///< over pixels of equal id, in steps of 2^-24
   std::int64_t worst_pixel = -1;     ///< index of the first error, or -1
   bool within_bound() const { return errors == 0; }
 };
 
-/// Compares ids and depths that a kernel drew against `truth`, and classifies every difference by the bound of its mode.
-Comparison compare_with_double(const IdImage& truth, std::span<const std::int32_t> ids, std::span<const float> depths,
-                               std::span<const Triangle> triangles, const Camera& camera, FillRule fill,
-                               NearRule near_rule, const ModeBound& bound);
+/// Compares ids and depths that a kernel drew against `truth`, and classifies every difference by the bound
+/// of its mode. The fill rule is not asked for: a centre on an edge is within every mode's bound of it. A
+/// pixel without a triangle must have depth 1. Throws Error if the sizes do not match.
+Comparison compare_with_double(const IdImage& truth, std::span<const std::int32_t> ids,
+                               std::span<const float> depths, std::span<const Triangle> triangles,
+                               const Camera& camera, NearRule near_rule, const ModeBound& bound);
 
 }  // namespace rasterbench

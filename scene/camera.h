@@ -19,7 +19,8 @@ struct AffineRow {
 /// Where in a pixel its sample lies, relative to the image plane.
 enum class Sampling {
   kCentre,  ///< sample (j+.5, i+.5); the viewport spans W x H pixels (the course contract)
-  kCorner,  ///< the outermost samples lie on the image corners: the viewport spans (W-1) x (H-1) pixels (the PLY contract)
+  kCorner,  ///< the outermost samples lie on the image corners: the viewport spans (W-1) x (H-1) pixels (the
+            ///< PLY contract)
 };
 
 /// Image size in pixels; 1 <= width, height <= kMaxImageSide.
@@ -31,9 +32,10 @@ struct Viewport {
 
 inline constexpr int kMaxImageSide = 65536;
 
-/// World to clip space in homogeneous coordinates: (x, y, z, w)(P), each an affine function of the world point, so that
-/// x/w and y/w are in [-1, 1] inside the view (y up), z/w = -1 on the near and +1 on the far plane, w > 0 in front.
-/// `near_distance` is the signed distance in front of the near plane, kept apart because z + w loses it to rounding.
+/// World to clip space in homogeneous coordinates: (x, y, z, w)(P), each an affine function of the world
+/// point, so that x/w and y/w are in [-1, 1] inside the view (y up), z/w = -1 on the near and +1 on the far
+/// plane, w > 0 in front. `near_distance` is the signed distance in front of the near plane, kept apart
+/// because z + w loses it to rounding.
 struct Camera {
   AffineRow x, y, z, w;
   AffineRow near_distance;
@@ -43,10 +45,13 @@ struct Camera {
 /// The camera of the course contract (INFO0939): at `position`, looking at the origin, y up, perspective.
 /// D = |M| and D_g = sqrt(Mx^2 + Mz^2) by hypot; on the Y axis e_U = e_X and e_V = -sgn(My) e_Z.
 /// `theta` is the vertical field of view in radians; 0 < near_plane < far_plane.
-/// Preconditions (checked by the reader of scene parameters, which can name the field): position != 0, 0 < theta < pi.
-Camera look_at_origin(const Vec3d& position, double theta, double near_plane, double far_plane, const Viewport& viewport);
+/// Preconditions (checked by the reader of scene parameters, which can name the field): position != 0, 0 <
+/// theta < pi.
+Camera look_at_origin(const Vec3d& position, double theta, double near_plane, double far_plane,
+                      const Viewport& viewport);
 
-/// An orthographic camera with the same view frame: `half_height` world units are visible above and below the centre.
+/// An orthographic camera with the same view frame: `half_height` world units are visible above and below the
+/// centre.
 Camera orthographic_at_origin(const Vec3d& position, double half_height, double near_plane, double far_plane,
                               const Viewport& viewport);
 

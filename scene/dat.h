@@ -1,4 +1,5 @@
-// The .dat format of the course contract: int32 T (little-endian), then T x 9 float32: corners A, B, C of each triangle.
+// The .dat format of the course contract: int32 T (little-endian), then T x 9 float32: corners A, B, C of
+// each triangle.
 #pragma once
 
 #include <filesystem>
@@ -7,8 +8,8 @@
 
 namespace rasterbench {
 
-/// Reads a .dat file. T is checked against the file's size before anything is allocated. Throws InputError that names both
-/// counts when the file is too short; warns on stderr, naming both, when bytes are left over.
+/// Reads a .dat file. T is checked against the file's size before anything is allocated. Throws InputError
+/// that names both counts when the file is too short; warns on stderr, naming both, when bytes are left over.
 Model read_dat(const std::filesystem::path& path);
 
 /// Writes `model` as .dat; write_file's guarantees.

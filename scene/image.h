@@ -1,4 +1,5 @@
-// Image and array writers. Every file is written beside its target and renamed into place when it is complete.
+// Image and array writers. Every file is written beside its target and renamed into place when it is
+// complete.
 #pragma once
 
 #include <cstdint>
@@ -8,18 +9,25 @@
 
 namespace rasterbench {
 
-/// Replaces `path` by `bytes`, or leaves what was there: writes a temporary file in the same folder, then renames it.
-/// Throws InputError that names the path.
+/// Replaces `path` by `bytes`, or leaves what was there: writes a temporary file in the same folder, then
+/// renames it. A symbolic link is followed; a device or a pipe (/dev/stdout) is written to as it is. Throws
+/// InputError that names the path.
 void write_file(const std::filesystem::path& path, std::string_view bytes);
 
-/// Writes RGBA8 pixels (row 0 on top, width * height of them) as P6 PPM or PNG, by the path's extension; alpha is dropped.
-void write_image(const std::filesystem::path& path, std::span<const std::uint32_t> rgba, int width, int height);
+/// The same for a file that lies in memory as several pieces, e.g. a header and an array.
+void write_file(const std::filesystem::path& path, std::span<const std::string_view> pieces);
+
+/// Writes RGBA8 pixels (row 0 on top, width * height of them) as P6 PPM or PNG, by the path's extension (.ppm
+/// or .png, in any case); alpha is dropped. A pixel is r + (g << 8) + (b << 16) + (a << 24).
+void write_image(const std::filesystem::path& path, std::span<const std::uint32_t> rgba, int width,
+                 int height);
 
 /// Throws InputError unless the extension of `path` is one that write_image knows.
 void check_image_path(const std::filesystem::path& path);
 
 /// Writes NumPy .npy (version 1.0) arrays of shape (height, width), little-endian, C order.
-void write_npy(const std::filesystem::path& path, std::span<const std::int32_t> values, int width, int height);
+void write_npy(const std::filesystem::path& path, std::span<const std::int32_t> values, int width,
+               int height);
 void write_npy(const std::filesystem::path& path, std::span<const float> values, int width, int height);
 
 }  // namespace rasterbench

@@ -4,6 +4,8 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <map>
 #include <string>
 
 #include "scene/camera.h"
@@ -21,25 +23,32 @@ struct SceneParameters {
   Rgb object{210, 215, 225};
   Rgb background{28, 32, 40};
   Vec3d camera{0.70, 0.78, 1.51};
-  int height = 1080;  ///< pixels; the file has height first
-  int width = 1920;   ///< pixels
+  int height = 1080;           ///< pixels; the file has height first
+  int width = 1920;            ///< pixels
   double theta = 0.785398163;  ///< vertical field of view, radians
   double near_plane = 0.1;
   double far_plane = 10.0;
 };
 
-/// Reads a scene parameter file: object RGB, background RGB, camera x y z, height width, theta, near far; any white
-/// space separates. Throws InputError with file, line and field. "theta in (pi, 180]" asks "degrees?".
+/// Reads a scene parameter file: object RGB, background RGB, camera x y z, height width, theta, near far; any
+/// white space separates. Throws InputError with file, line and field. "theta in (pi, 180]" asks "degrees?".
 SceneParameters read_scene_parameters(const std::filesystem::path& path);
 
-/// Checks every field (accuracy.md, section 1); `file` is named in the error, with `lines` the line of each field or empty.
-void check_scene_parameters(const SceneParameters& parameters, const std::string& file);
+/// The line of each field of a scene parameter file: "object red" ... "camera x" ... "height", "width",
+/// "theta", "near", "far".
+using FieldLines = std::map<std::string, std::int64_t, std::less<>>;
 
-/// Writes `parameters` so that read_scene_parameters gives the same values to the bit.
+/// Checks every field (accuracy.md, section 1); `file` is named in the error, with the field's line where
+/// `lines` has it.
+void check_scene_parameters(const SceneParameters& parameters, const std::string& file,
+                            const FieldLines& lines = {});
+
+/// Checks `parameters` and writes them so that read_scene_parameters gives the same values to the bit.
 void write_scene_parameters(const SceneParameters& parameters, const std::filesystem::path& path);
 
-/// Parameters that frame `model`: a camera on the default direction, far enough away that the bounding sphere about the
-/// origin is in view, near and far just outside of it.
+/// Parameters that frame `model`: a camera on the default direction, far enough away that the bounding sphere
+/// about the origin is in view, near and far just outside of it. Corners that are not finite are left out; a
+/// model without extent gets the defaults.
 SceneParameters framing_parameters(const Model& model);
 
 /// The camera of these parameters, sampling at pixel centres.

@@ -16,8 +16,8 @@ struct Scene {
   SceneParameters parameters;
 };
 
-/// Opens MODEL ("x.dat" or "teapot:triangles=43000") with the parameters of `scene_file`, or, where that is empty, with the
-/// generator's own parameters or those that frame the model. Throws InputError.
+/// Opens MODEL ("x.dat" or "teapot:triangles=43000") with the parameters of `scene_file`, or, where that is
+/// empty, with the generator's own parameters or those that frame the model. Throws InputError.
 Scene open_scene(const std::string& model, const std::string& scene_file);
 
 /// A 128-bit hash (XXH3), as 32 hex digits, of the triangles' bytes and every parameter but the image size.

@@ -1,0 +1,193 @@
+"""What may be compared with what: groups of points, their names, their bases, the fastest of each group."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from . import statistics, text
+from .load import Config, Record, Study
+from .statistics import Comparison, Estimate
+
+# Two points are compared only if these are equal: same picture, same arithmetic, same region, same cache state.
+GROUP_AXES = ("scene", "scene_hash", "size", "numeric", "fill", "near", "output", "cache")
+# Always in a point's name: kernel, backend:schedule,chunk, threads. These only where a kernel has several values.
+EXTRA_AXES = ("isa", "tile", "binding", "wait_policy", "runtime")
+BASE_AXES = ("scene", "scene_hash", "size", "numeric", "fill", "near", "isa", "output", "cache")
+
+
+@dataclass
+class Group:
+    """The points of one picture in one arithmetic."""
+
+    key: tuple
+    title: str
+    records: list[Record]
+    best: Record | None = None
+    comparisons: dict[str, Comparison] = field(default_factory=dict)
+
+    @property
+    def timed(self) -> list[Record]:
+        return [record for record in self.records if record.ok]
+
+    @property
+    def untimed(self) -> list[Record]:
+        return [record for record in self.records if not record.ok]
+
+    @property
+    def kernels(self) -> list[str]:
+        return list(dict.fromkeys(record.config.kernel for record in self.records))
+
+    @property
+    def slug(self) -> str:
+        return slug(self.title)
+
+
+def slug(title: str) -> str:
+    """A title as a file name."""
+    words = "".join(c.lower() if c.isalnum() and c.isascii() else " " for c in title).split()
+    return "_".join(words)[:60]
+
+
+def execution(config: Config) -> str:
+    """'serial', 'openmp static', 'openmp dynamic,1', 'tbb auto'."""
+    if config.backend == "serial" or config.schedule is None:
+        return config.backend
+    chunk = "" if config.chunk is None else f",{config.chunk}"
+    return f"{config.backend} {config.schedule}{chunk}"
+
+
+class Analysis:
+    """A study with everything that is computed from it once and shown in several places."""
+
+    def __init__(self, study: Study) -> None:
+        self.study = study
+        self._extra = self._varying_extras()
+        self.estimates = {record.id: statistics.median_estimate(record.samples) for record in study.timed}
+        self.groups = self._groups()
+        self.serial_base = {record.id: self._find_serial_base(record) for record in study.timed}
+        self.thread_base = {record.id: self._find_thread_base(record) for record in study.timed}
+        self._ratios: dict[tuple[str, str], Estimate] = {}
+
+    # names
+
+    def _varying_extras(self) -> dict[str, list[str]]:
+        """For each kernel the axes without which two of its points would have one name."""
+        values: dict[tuple, set] = {}
+        for record in self.study.records:
+            config = record.config
+            named = (*(getattr(config, axis) for axis in GROUP_AXES), config.kernel, execution(config), config.threads)
+            for axis in EXTRA_AXES:
+                values.setdefault((config.kernel, axis, named), set()).add(getattr(config, axis))
+        varying: dict[str, list[str]] = {}
+        for (kernel, axis, _), found in values.items():
+            if len(found) > 1 and axis not in varying.setdefault(kernel, []):
+                varying[kernel].append(axis)
+        return varying
+
+    def execution(self, record: Record) -> str:
+        extra = [f"{axis} {getattr(record.config, axis)}" for axis in self._extra.get(record.config.kernel, [])
+                 if getattr(record.config, axis) is not None]
+        return ", ".join([execution(record.config), *extra])
+
+    def threads(self, record: Record) -> str:
+        return text.count(record.config.threads, "thread")
+
+    def label(self, record: Record) -> str:
+        """'tile_parallel with openmp dynamic,1 on 2 threads'."""
+        where = "" if record.config.backend == "serial" else f" on {self.threads(record)}"
+        return f"{record.config.kernel} with {self.execution(record)}{where}"
+
+    def time(self, record: Record) -> str:
+        e = self.estimates[record.id]
+        return text.estimate(e.value, e.low, e.high, " ms")
+
+    @cached_property
+    def machine(self) -> str:
+        """'AMD EPYC 7763, 8 CPUs' for captions."""
+        machine = self.study.context["machine"]
+        cpu = machine.get("cpu")
+        words = [str(cpu) if cpu and not str(cpu).startswith("unavailable") else "unknown CPU"]
+        allowed = machine.get("cpus_allowed")
+        if isinstance(allowed, list):
+            words.append(text.count(len(allowed), "CPU") + " allowed")
+        return ", ".join(words)
+
+    # groups and bases
+
+    def _groups(self) -> list[Group]:
+        found: dict[tuple, list[Record]] = {}
+        for record in self.study.records:
+            found.setdefault(tuple(getattr(record.config, axis) for axis in GROUP_AXES), []).append(record)
+        varying = [axis for i, axis in enumerate(GROUP_AXES) if len({key[i] for key in found}) > 1]
+        # A hash is said only where the same name stands for two contents.
+        names = {key[0] for key in found}
+        if len({key[:2] for key in found}) == len(names) and "scene_hash" in varying:
+            varying.remove("scene_hash")
+        groups = []
+        for key, records in found.items():
+            config = records[0].config
+            title = f"{config.scene} {config.size[0]}x{config.size[1]} {config.numeric}"
+            said = {"scene", "size", "numeric"}
+            title += "".join(f" {getattr(config, axis)}" for axis in varying if axis not in said)
+            groups.append(self._compared(Group(key, title, records)))
+        return groups
+
+    def _compared(self, group: Group) -> Group:
+        timed = group.timed
+        if timed:
+            best, comparisons = statistics.compare_with_best([r.samples for r in timed], self.study.target)
+            group.best = timed[best]
+            group.comparisons = {record.id: c for record, c in zip(timed, comparisons)}
+        return group
+
+    def group_of(self, record: Record) -> Group:
+        return next(group for group in self.groups if any(r is record for r in group.records))
+
+    def _median(self, record: Record) -> float:
+        return self.estimates[record.id].value
+
+    def fastest(self, records: list[Record]) -> Record | None:
+        return min(records, key=self._median, default=None)
+
+    def slowest(self, records: list[Record]) -> Record | None:
+        return max(records, key=self._median, default=None)
+
+    def _find_serial_base(self, record: Record) -> Record | None:
+        """Base (a): the fastest serial record with equal picture, numeric mode, instruction set, output, cache."""
+        key = [getattr(record.config, axis) for axis in BASE_AXES]
+        return self.fastest([r for r in self.study.timed if r.config.backend == "serial"
+                             and [getattr(r.config, axis) for axis in BASE_AXES] == key])
+
+    def _find_thread_base(self, record: Record) -> Record | None:
+        """Base (b): the same point on one thread; a serial point is its own."""
+        if record.config.threads == 1 or record.config.backend == "serial":
+            return record
+
+        def axes(config: Config) -> dict:
+            return {**vars(config), "threads": None}
+
+        same = axes(record.config)
+        return next((r for r in self.study.timed if r.config.threads == 1 and axes(r.config) == same), None)
+
+    def speedup(self, record: Record, base: Record | None) -> Estimate | None:
+        """Time of the base / time of the point, from paired samples."""
+        if base is None or base is record:
+            return None
+        key = (base.id, record.id)
+        if key not in self._ratios:
+            self._ratios[key] = statistics.ratio(base.samples, record.samples)
+        return self._ratios[key]
+
+    # shared selections
+
+    @property
+    def thread_counts(self) -> list[int]:
+        return sorted({r.config.threads for r in self.study.timed if r.config.backend != "serial"})
+
+    def sampled(self, records: list[Record]) -> str:
+        return text.span([record.samples.n for record in records if record.ok])
+
+    def interval_kind(self, records: list[Record]) -> str:
+        kinds = {self.estimates[r.id].kind for r in records if r.ok} - {"none"}
+        return " / ".join(sorted(kinds))

@@ -1,0 +1,17 @@
+"""One module a figure. Each yields the figures that its data allow, and none where there are no data."""
+
+from __future__ import annotations
+
+from typing import Iterator
+
+from ..comparison import Analysis
+from . import balance, scaling, scenes, schedules, stages, times
+from .common import Drawing
+
+MODULES = (scenes, times, scaling, schedules, stages, balance)
+
+
+def draw(analysis: Analysis) -> Iterator[Drawing]:
+    """The figures of the report in its order, drawn one at a time so that only one is held in memory."""
+    for module in MODULES:
+        yield from module.draw(analysis)

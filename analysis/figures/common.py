@@ -1,0 +1,214 @@
+"""What the figures share: a drawing with its caption, and the dot plot with one labelled row an execution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from .. import style, text
+from ..captions import Caption
+from ..comparison import Analysis, Group
+from ..load import Record
+
+ROW_HEIGHT = 0.175  # inches
+MAX_ROWS = 44  # more rows go to a further figure
+LABEL_SIZE = 7.5
+
+
+@dataclass(frozen=True)
+class Drawing:
+    name: str  # file name without suffix
+    section: str
+    figure: Figure
+    caption: Caption
+    raster: bool = False  # shown as PNG in the report: it is made of pixels anyway
+
+
+@dataclass(frozen=True)
+class Point:
+    value: float
+    low: float | None
+    high: float | None
+    series: int
+    ringed: bool = False
+
+
+@dataclass(frozen=True)
+class Row:
+    label: str
+    points: tuple[Point, ...] = ()
+    message: str = ""  # instead of points: why there are none
+    note: str = ""  # in the right margin
+
+
+@dataclass
+class Block:
+    """The rows of one kernel."""
+
+    kernel: str
+    rows: list[Row] = field(default_factory=list)
+    continued: bool = False
+
+    @property
+    def title(self) -> str:
+        return self.kernel + (" (continued)" if self.continued else "")
+
+
+def pages(blocks: list[Block], limit: int = MAX_ROWS) -> list[list[Block]]:
+    """Blocks in as few figures as hold them, about equally filled; a block longer than a figure is divided."""
+    pieces = []
+    for block in blocks:
+        step = limit - 1
+        parts = [block.rows[i:i + step] for i in range(0, len(block.rows), step)]
+        pieces += [Block(block.kernel, rows, i > 0) for i, rows in enumerate(parts)]
+    total = sum(len(piece.rows) + 1 for piece in pieces)
+    even = max(1, -(-total // max(1, -(-total // limit))))
+    result: list[list[Block]] = []
+    used = limit + 1
+    for piece in pieces:
+        size = len(piece.rows) + 1
+        if used + size > limit or (used >= even and result):
+            result.append([])
+            used = 0
+        result[-1].append(piece)
+        used += size
+    return result
+
+
+def spread(values: list[float]) -> bool:
+    """Whether the values ask for a log axis: more than a factor of ten apart."""
+    return bool(values) and min(values) > 0 and max(values) / min(values) > 10
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Axes with one labelled line a row, below the name of its kernel."""
+
+    figure: Figure
+    axes: Axes
+    rows: list[tuple[float, Row]]  # y of each row
+
+
+def row_frame(blocks: list[Block], title: str, unit: str, *, limits: tuple[float, float], log: bool,
+              keys: list) -> Frame:
+    rows = sum(len(block.rows) + 1 for block in blocks)
+    labels = [row.label for block in blocks for row in block.rows]
+    heads = [block.title for block in blocks]
+    left = 0.25 + max(style.text_width(labels, LABEL_SIZE) + 0.1, style.text_width(heads, LABEL_SIZE, bold=True))
+    notes = [row.note for block in blocks for row in block.rows if row.note]
+    right = 0.15 + (style.text_width(notes, 7) + 0.08 if notes else 0.0)
+    columns = style.legend_columns([key.get_label() for key in keys])
+    foot = 0.5 + (0.17 * -(-len(keys) // columns) if keys else 0)
+    wide, height = style.FULL_WIDTH - left - right, rows * ROW_HEIGHT + 0.35 + foot
+    figure = style.new_figure(style.FULL_WIDTH, height)
+    axes = style.place(figure, left, foot, wide, rows * ROW_HEIGHT)
+    axes.set_ylim(rows - 0.5, -0.5)
+    axes.set_yticks([])
+    style.number_axis(axes, *limits, log)
+    axes.grid(axis="x")
+    axes.set_xlabel(unit)
+    figure.text(0.1 / style.FULL_WIDTH, 1 - 0.2 / height, title, fontsize=8.5, weight="bold", va="center")
+    placed: list[tuple[float, Row]] = []
+    y = 0
+    for i, block in enumerate(blocks):
+        if i % 2 == 0:
+            axes.axhspan(y - 0.5, y + len(block.rows) + 0.5, color=style.BAND, lw=0, zorder=0)
+        _label(axes, y, block.title, left - 0.1, weight="bold", ha="left")
+        for row in block.rows:
+            y += 1
+            placed.append((y, row))
+            _label(axes, y, row.label, 0.07, color=style.FAILED if row.message else "black", ha="right")
+            if row.message:
+                axes.text(0.01, y, text.shorten(row.message, int(wide / 0.058)), transform=axes.get_yaxis_transform(),
+                          fontsize=7, style="italic", color=style.FAILED, va="center", clip_on=True)
+            if row.note:
+                axes.annotate(row.note, (1, y), xycoords=("axes fraction", "data"), xytext=(4, 0),
+                              textcoords="offset points", fontsize=7, va="center", annotation_clip=False)
+        y += 1
+    if keys:
+        figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.05 / style.FULL_WIDTH, 0.02 / height),
+                      ncol=columns, borderaxespad=0.2, columnspacing=1.2, handletextpad=0.5)
+    return Frame(figure, axes, placed)
+
+
+def dots(blocks: list[Block], series: list[str], title: str, unit: str, *, limits: tuple[float, float], log: bool,
+         ring: str = "", reference: float | None = None, reference_name: str = "") -> Figure:
+    """Horizontal dot plot with intervals."""
+    keys = _keys(series, ring, reference, reference_name)
+    frame = row_frame(blocks, title, unit, limits=limits, log=log, keys=keys)
+    for y, row in frame.rows:
+        _points(frame.axes, row, y, len(series))
+    if reference is not None:
+        frame.axes.axvline(reference, color="black", lw=0.8, ls=(0, (4, 2)), zorder=1)
+    return frame.figure
+
+
+def _label(axes, y: float, label: str, offset: float, **options) -> None:
+    axes.annotate(label, (0, y), xycoords=("axes fraction", "data"), xytext=(-72 * offset, 0),
+                  textcoords="offset points", fontsize=LABEL_SIZE, va="center", annotation_clip=False, **options)
+
+
+def _points(axes, row: Row, y: float, series: int) -> None:
+    for point in row.points:
+        look = style.look(point.series)
+        # Points of one row are set apart a little: at equal times all of them stay visible.
+        at = y + (point.series - (series - 1) / 2) * min(0.2, 0.6 / max(1, series))
+        if point.low is not None:
+            axes.plot([point.low, point.high], [at, at], color=look.colour, lw=1.4, solid_capstyle="butt", zorder=3)
+            axes.plot([point.low, point.high], [at, at], color=look.colour, lw=0, marker="|", ms=5, mew=1.0, zorder=3)
+        axes.plot(point.value, at, marker=look.marker, color=look.colour, ms=4, mew=0, zorder=4)
+        if point.ringed:
+            axes.plot(point.value, at, marker="o", mfc="none", mec="black", mew=0.8, ms=8, zorder=5)
+
+
+def _keys(series: list[str], ring: str, reference: float | None, reference_name: str) -> list[Line2D]:
+    keys = [Line2D([], [], color=style.look(i).colour, marker=style.look(i).marker, lw=1.4, ms=4, label=name)
+            for i, name in enumerate(series)]
+    if ring:
+        keys.append(Line2D([], [], color="black", marker="o", mfc="none", ms=8, lw=0, mew=0.8, label=ring))
+    if reference is not None and reference_name:
+        keys.append(Line2D([], [], color="black", lw=0.8, ls=(0, (4, 2)), label=reference_name))
+    return keys
+
+
+def execution_rows(analysis: Analysis, group: Group, kernel: str) -> dict[str, list[Record]]:
+    """The timed points of a kernel by execution, in the order of the study; serial comes first in a study file."""
+    rows: dict[str, list[Record]] = {}
+    for record in group.timed:
+        if record.config.kernel == kernel:
+            rows.setdefault(analysis.execution(record), []).append(record)
+    return rows
+
+
+def untimed_rows(analysis: Analysis, group: Group, kernel: str, most: int = 3) -> list[Row]:
+    """Failed and skipped points of a kernel with their reasons; many with one reason share a row."""
+    reasons: dict[tuple[str, str], list[Record]] = {}
+    for record in group.untimed:
+        if record.config.kernel == kernel:
+            reasons.setdefault((record.status, record.reason), []).append(record)
+    rows = []
+    for (status, reason), records in reasons.items():
+        message = f"{status}: {reason}"
+        if len(records) <= most:
+            rows += [Row(f"{analysis.execution(r)}, {analysis.threads(r)}", message=message) for r in records]
+        else:
+            rows.append(Row(text.count(len(records), "point"), message=message))
+    return rows
+
+
+def bounds(points: list[Point]) -> tuple[float, float]:
+    lows = [p.low if p.low is not None else p.value for p in points]
+    highs = [p.high if p.high is not None else p.value for p in points]
+    return float(np.min(lows)), float(np.max(highs))
+
+
+def named(base: str, page: int, count: int) -> str:
+    return base if count == 1 else f"{base}_{page + 1}"
+
+
+def part(page: int, count: int) -> str:
+    return "" if count == 1 else f" ({page + 1} of {count})"

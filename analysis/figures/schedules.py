@@ -1,0 +1,147 @@
+"""Schedule x chunk as a heat map, one panel a kernel, at the highest thread count."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Iterator
+
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LinearSegmentedColormap, LogNorm
+from matplotlib.patches import Patch, Rectangle
+
+from .. import captions, statistics, style, text
+from ..comparison import Analysis, Group
+from ..load import Record
+from ..statistics import Comparison
+from .common import Drawing, named, part
+
+SECTION = "Schedules and chunks"
+CELL_HEIGHT = 0.23  # inches
+PALEST_RANGE = 1.5  # a few per cent must not look like a factor
+DARKEST = 4.0  # slower than four times the best needs no further shades
+# One hue from white to dark: it survives grey paper and every kind of colour vision.
+SHADES = LinearSegmentedColormap.from_list("slower", ["#FFFFFF", "#BBD7EA", "#5E9DC8", "#0F4F82", "#06284A"])
+
+
+@dataclass(frozen=True)
+class Panel:
+    kernel: str
+    cells: dict[tuple[str, int | None], Record]
+    comparisons: dict[str, Comparison]
+
+
+def draw(analysis: Analysis) -> Iterator[Drawing]:
+    for group in analysis.groups:
+        panels, threads = heat_panels(analysis, group)
+        if panels:
+            yield from _draw(analysis, group, panels, threads)
+
+
+def row_name(analysis: Analysis, record: Record) -> str:
+    """The execution without its chunk, which has a column of its own."""
+    name = analysis.execution(record)
+    return name if record.config.chunk is None else name.replace(f",{record.config.chunk}", "", 1)
+
+
+def heat_panels(analysis: Analysis, group: Group) -> tuple[list[Panel], int]:
+    """The kernels with at least two schedules or chunks, each compared within itself."""
+    parallel = [r for r in group.records if r.config.backend != "serial" and r.config.schedule is not None]
+    threads = max((r.config.threads for r in parallel if r.ok), default=0)
+    panels = []
+    for kernel in group.kernels:
+        records = [r for r in parallel if r.config.kernel == kernel and r.config.threads == threads]
+        cells = {(row_name(analysis, r), r.config.chunk): r for r in records}
+        timed = [r for r in cells.values() if r.ok]
+        if len(timed) < 2:
+            continue
+        _, comparisons = statistics.compare_with_best([r.samples for r in timed], analysis.study.target)
+        panels.append(Panel(kernel, cells, {r.id: c for r, c in zip(timed, comparisons)}))
+    return panels, threads
+
+
+def _draw(analysis: Analysis, group: Group, panels: list[Panel], threads: int) -> Iterator[Drawing]:
+    rows = list(dict.fromkeys(row for panel in panels for row, _ in panel.cells))
+    chunks = sorted({chunk for panel in panels for _, chunk in panel.cells}, key=lambda c: -1 if c is None else c)
+    across = max(1, min(3, int(5.2 / (0.42 * len(chunks) + 0.15)), len(panels)))
+    down = max(1, int((style.MAX_HEIGHT - 1.3) / (len(rows) * CELL_HEIGHT + 0.45)))
+    split = [panels[i:i + across * down] for i in range(0, len(panels), across * down)]
+    for page, chosen in enumerate(split):
+        figure = _figure(analysis, group, chosen, rows, chunks, across, threads, part(page, len(split)))
+        shown = [r for panel in chosen for r in panel.cells.values() if r.ok]
+        caption = captions.build(
+            analysis, f"Schedule and chunk, {group.title}, {text.count(threads, 'thread')}{part(page, len(split))}",
+            "Look for pale cells: shades give the time relative to the fastest cell of the same panel, numbers the time.",
+            shown, estimates=None,
+            notes=[f"Cells are median times of a frame in ms ({analysis.sampled(shown)}); 'default' leaves the chunk to the"
+                   " runtime. The thick frame is the fastest cell of a panel, thin frames cannot be told apart from it (rank"
+                   " test with Holm correction within the panel, and paired interval). Other thread counts are in the"
+                   " table of all points."])
+        yield Drawing(named(f"schedules_{group.slug}", page, len(split)), SECTION, figure, caption)
+
+
+def _figure(analysis: Analysis, group: Group, panels: list[Panel], rows: list[str], chunks: list[int | None],
+            across: int, threads: int, suffix: str):
+    left = 0.2 + style.text_width(rows, 7)
+    wide = min(0.75 * len(chunks), (style.FULL_WIDTH - left - 0.1) / across - 0.15)
+    tall = len(rows) * CELL_HEIGHT
+    down = -(-len(panels) // across)
+    foot, head = 0.95, 0.35
+    height = head + foot + down * (tall + 0.3)
+    figure = style.new_figure(style.FULL_WIDTH, height)
+    norm = LogNorm(1, max(PALEST_RANGE, min(DARKEST, _worst(panels))))
+    for i, panel in enumerate(panels):
+        row, column = divmod(i, across)
+        axes = style.place(figure, left + column * (wide + 0.15), height - head - (row + 1) * (tall + 0.3) + 0.02, wide, tall)
+        _panel(analysis, axes, panel, rows, chunks, norm)
+        axes.set_yticks(range(len(rows)), rows if column == 0 else [""] * len(rows), fontsize=7)
+        last = i + across >= len(panels)
+        axes.set_xticks(range(len(chunks)), [_chunk(c) for c in chunks] if last else [""] * len(chunks), fontsize=7)
+        if last:
+            axes.set_xlabel("chunk or grain (iterations)", fontsize=7.5, labelpad=2)
+    figure.text(0.1 / style.FULL_WIDTH, 1 - 0.13 / height, f"{group.title}, {text.count(threads, 'thread')}{suffix}: median"
+                " time of a frame (ms)", fontsize=8.5, weight="bold", va="center")
+    bar = style.place(figure, left, 0.34, 2.0, 0.09)
+    figure.colorbar(ScalarMappable(norm, SHADES), cax=bar, orientation="horizontal",
+                    extend="max" if _worst(panels) > DARKEST else "neither")
+    bar.minorticks_off()
+    ticks = [t for t in (1, 1.02, 1.05, 1.1, 1.2, 1.5, 2, 3, 4) if t <= norm.vmax]
+    keep = [t for t in ticks if t == 1 or t >= 1 + (norm.vmax - 1) / 5]
+    bar.set_xticks(keep, [f"{t:g}" for t in keep], fontsize=7)
+    bar.set_xlabel("time / fastest of the panel", fontsize=7.5, labelpad=1)
+    keys = [Patch(facecolor="none", edgecolor="black", lw=2.0, label="fastest of the panel"),
+            Patch(facecolor="none", edgecolor="black", lw=0.8, ls="--", label="not distinguishable from it")]
+    figure.legend(handles=keys, loc="lower left", bbox_to_anchor=((left + 2.3) / style.FULL_WIDTH, 0.12 / height))
+    return figure
+
+
+def _worst(panels: list[Panel]) -> float:
+    return max(c.ratio.value for panel in panels for c in panel.comparisons.values())
+
+
+def _chunk(chunk: int | None) -> str:
+    return "default" if chunk is None else str(chunk)
+
+
+def _panel(analysis: Analysis, axes: Axes, panel: Panel, rows: list[str], chunks: list[int | None], norm: LogNorm) -> None:
+    axes.set_xlim(-0.5, len(chunks) - 0.5)
+    axes.set_ylim(len(rows) - 0.5, -0.5)
+    axes.tick_params(length=0)
+    axes.set_facecolor("#EFEFEF")  # a combination that was not planned
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+    axes.set_title(panel.kernel, loc="left", fontsize=8, pad=3)
+    for (row, chunk), record in panel.cells.items():
+        x, y = chunks.index(chunk), rows.index(row)
+        comparison = panel.comparisons.get(record.id)
+        if comparison is None:
+            axes.text(x, y, record.status, fontsize=6, color=style.FAILED, style="italic", ha="center", va="center")
+            continue
+        shade = norm(min(max(comparison.ratio.value, 1.0), norm.vmax))
+        axes.add_patch(Rectangle((x - 0.5, y - 0.5), 1, 1, facecolor=SHADES(shade), edgecolor="white", lw=0.5))
+        best, near = comparison.verdict == "best", comparison.verdict in ("same", "ambiguous")
+        if best or near:
+            axes.add_patch(Rectangle((x - 0.44, y - 0.41), 0.88, 0.82, facecolor="none", lw=1.8 if best else 0.8,
+                                     edgecolor="black" if shade < 0.6 else "white", ls="-" if best else "--", zorder=3))
+        axes.text(x, y, text.number(analysis.estimates[record.id].value), fontsize=6.5, ha="center", va="center",
+                  color="black" if shade < 0.45 else "white", weight="bold" if best else "normal", zorder=4)

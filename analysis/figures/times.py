@@ -1,0 +1,68 @@
+"""Time of every point, and with a single thread count its speedup over the fastest serial kernel."""
+
+from __future__ import annotations
+
+from typing import Iterator
+
+from .. import captions
+from ..comparison import Analysis, Group
+from ..load import Record
+from ..statistics import Estimate
+from .common import Block, Drawing, Point, Row, bounds, dots, execution_rows, named, pages, part, spread, untimed_rows
+
+SECTION = "Time per strategy"
+
+
+def draw(analysis: Analysis) -> Iterator[Drawing]:
+    for group in analysis.groups:
+        if group.timed:
+            yield from _draw(analysis, group)
+
+
+def thread_series(records: list[Record]) -> list[int]:
+    return sorted({record.config.threads for record in records})
+
+
+def point(estimate: Estimate, series: int, ringed: bool = False) -> Point:
+    return Point(estimate.value, estimate.low, estimate.high, series, ringed)
+
+
+def _draw(analysis: Analysis, group: Group) -> Iterator[Drawing]:
+    threads = thread_series(group.timed)
+    blocks = []
+    for kernel in group.kernels:
+        rows = []
+        for execution, records in execution_rows(analysis, group, kernel).items():
+            points = tuple(point(analysis.estimates[r.id], threads.index(r.config.threads), near_best(group, r))
+                           for r in records)
+            rows.append(Row(execution, points, note="fastest" if group.best in records else ""))
+        rows += untimed_rows(analysis, group, kernel)
+        blocks.append(Block(kernel, rows))
+    every = [p for block in blocks for row in block.rows for p in row.points]
+    log = spread([p.value for p in every])
+    split = pages(blocks)
+    for page, chosen in enumerate(split):
+        shown = [r for r in group.timed if any(block.kernel == r.config.kernel for block in chosen)]
+        # All pages of a scene share one axis, so that they can be laid side by side.
+        figure = dots(chosen, [f"{n} thread{'s' if n > 1 else ''}" for n in threads], group.title + part(page, len(split)),
+                      "time of a frame, median (ms)" + (", log scale" if log else ""), limits=bounds(every), log=log,
+                      ring="fastest, and not distinguishable from it")
+        caption = captions.build(
+            analysis, f"Time per strategy, {group.title}{part(page, len(split))}",
+            "Left is faster. Where two intervals are apart the points differ; rings mark the fastest and what cannot be told"
+            " apart from it.", shown, notes=_notes(analysis, group))
+        yield Drawing(named(f"time_{group.slug}", page, len(split)), SECTION, figure, caption)
+
+
+def near_best(group: Group, record: Record) -> bool:
+    return group.comparisons[record.id].verdict != "slower" and len(group.timed) > 1
+
+
+def _notes(analysis: Analysis, group: Group) -> list[str]:
+    notes = ["An interval that is narrower than its marker is hidden by it."]
+    if len(group.timed) > 1:
+        notes.append("Told apart means: rank test with Holm correction over "
+                     f"{len(group.timed) - 1} comparisons below 0.05, and the paired interval of the ratio above 1.")
+    if group.untimed:
+        notes.append("Failed and skipped points are listed with their reasons and show no time.")
+    return notes

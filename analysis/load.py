@@ -1,0 +1,295 @@
+"""Reads and checks what a study wrote (harness/records.md): DIR/context.json and DIR/records.jsonl."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from .statistics import Samples, is_number
+
+SCHEMA = 1
+STAGES = ("clear", "geometry", "raster", "resolve")
+STATUSES = ("ok", "failed", "skipped")
+
+
+class InputError(Exception):
+    """Bad input, as one line that names the file, the place and the field."""
+
+    def __init__(self, path: Path, problem: str, line: int | None = None, field: str | None = None) -> None:
+        place = str(path) + (f":{line}" if line is not None else "")
+        super().__init__(f"{place}: {field + ': ' if field else ''}{problem}".replace("\n", " "))
+
+
+@dataclass(frozen=True)
+class Config:
+    """The axes of a point. Those without a default decide which points may be compared, so they must be there."""
+
+    scene: str
+    size: tuple[int, int]
+    kernel: str
+    numeric: str
+    fill: str
+    near: str
+    backend: str
+    schedule: str | None
+    chunk: int | None
+    threads: int
+    isa: str
+    output: str
+    cache: str
+    scene_hash: str | None = None
+    binding: str | None = None
+    wait_policy: str | None = None
+    runtime: str | None = None
+    tile: int | str | None = None
+
+
+@dataclass(frozen=True)
+class Record:
+    line: int
+    id: str
+    name: str
+    config: Config
+    status: str
+    reason: str
+    samples: Samples | None  # None unless the point was timed and conforms
+    stages: dict[str, np.ndarray]
+    stop: str | None
+    verify: dict[str, Any]
+    work: dict[str, Any]
+    threads_observed: int | None
+    per_thread: tuple[dict[str, Any], ...]
+    recorded_median: float | None
+    recorded_interval: tuple[float, float] | None
+    context: str | None
+    raw: dict[str, Any] = field(repr=False, default_factory=dict)
+
+    @property
+    def ok(self) -> bool:
+        return self.samples is not None
+
+
+@dataclass(frozen=True)
+class Study:
+    directory: Path
+    context: dict[str, Any]
+    records: list[Record]
+
+    @property
+    def name(self) -> str:
+        return str(self.context["study"].get("name", self.directory.name))
+
+    @property
+    def timed(self) -> list[Record]:
+        return [record for record in self.records if record.ok]
+
+    @property
+    def target(self) -> float:
+        sampling = self.context["study"].get("sampling")
+        target = sampling.get("target") if isinstance(sampling, dict) else None
+        return float(target) if is_number(target) and 0 < target < 1 else 0.02
+
+    def frame(self) -> pd.DataFrame:
+        """One row a record: the axes, then what was measured."""
+        rows = []
+        for record in self.records:
+            row: dict[str, Any] = {axis.name: getattr(record.config, axis.name) for axis in fields(Config)}
+            row["size"] = "x".join(map(str, record.config.size))
+            row |= {"id": record.id, "name": record.name, "status": record.status, "reason": record.reason,
+                    "stop": record.stop, "n": record.samples.n if record.ok else 0,
+                    "launches": record.samples.launch_count if record.ok else 0,
+                    "median_ms": float(np.median(record.samples.values)) if record.ok else np.nan,
+                    "conforms": record.verify.get("conforms"), "threads_observed": record.threads_observed}
+            rows.append(row)
+        return pd.DataFrame(rows)
+
+
+def load(directory: Path) -> Study:
+    directory = Path(directory)
+    if not directory.is_dir():
+        raise InputError(directory, "no such folder (expected the folder that a study wrote)")
+    context = _context(directory / "context.json")
+    return Study(directory, context, _records(directory / "records.jsonl"))
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise InputError(path, "no such file (was the study interrupted? run it again with --resume)") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(path, f"cannot be read: {error}") from None
+
+
+def _parse(text: str, path: Path, line: int | None) -> dict[str, Any]:
+    def refuse(name: str) -> float:
+        raise ValueError(f"{name} is not a JSON number")
+
+    try:
+        value = json.loads(text, parse_constant=refuse)
+    except json.JSONDecodeError as error:
+        raise InputError(path, f"not JSON: {error.msg} at column {error.colno}", line or error.lineno) from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(path, f"not JSON: {error}", line) from None
+    if not isinstance(value, dict):
+        raise InputError(path, "expected an object", line)
+    return value
+
+
+def _schema(value: dict[str, Any], path: Path, line: int | None) -> None:
+    if "schema" not in value:
+        raise InputError(path, "missing", line, "schema")
+    if value["schema"] != SCHEMA or isinstance(value["schema"], bool):
+        raise InputError(path, f"is {value['schema']!r}, this program reads {SCHEMA}", line, "schema")
+
+
+def _context(path: Path) -> dict[str, Any]:
+    context = _parse(_read(path), path, None)
+    _schema(context, path, None)
+    for key in ("program", "machine", "study"):
+        if key not in context:
+            raise InputError(path, "missing", None, key)
+        if not isinstance(context[key], dict):
+            raise InputError(path, "expected an object", None, key)
+    for key in ("points", "images", "libraries", "environment", "custom"):  # absent in small or older studies
+        if context.get(key) is None:
+            context[key] = {}
+        elif not isinstance(context[key], dict):
+            raise InputError(path, "expected an object", None, key)
+    return context
+
+
+def _records(path: Path) -> list[Record]:
+    records: list[Record] = []
+    seen: dict[str, int] = {}
+    for line, text in enumerate(_read(path).split("\n"), start=1):
+        if not text.strip():
+            continue
+        value = _parse(text, path, line)
+        record = _Reader(path, line, value).record()
+        if record.id in seen:
+            raise InputError(path, f"{record.id} is also on line {seen[record.id]}", line, "id")
+        seen[record.id] = line
+        records.append(record)
+    if not records:
+        raise InputError(path, "holds no records")
+    return records
+
+
+class _Reader:
+    """One line of records.jsonl. Unknown keys are kept in raw and otherwise ignored, so that a schema may grow."""
+
+    def __init__(self, path: Path, line: int, value: dict[str, Any]) -> None:
+        self.path, self.line, self.value = path, line, value
+
+    def fail(self, name: str, problem: str) -> InputError:
+        return InputError(self.path, problem, self.line, name)
+
+    def text(self, source: dict[str, Any], key: str, prefix: str = "") -> str:
+        if key not in source:
+            raise self.fail(prefix + key, "missing")
+        if not isinstance(source[key], str) or not source[key]:
+            raise self.fail(prefix + key, f"expected text, found {source[key]!r}")
+        return source[key]
+
+    def record(self) -> Record:
+        value = self.value
+        _schema(value, self.path, self.line)
+        identity, name = self.text(value, "id"), self.text(value, "name")
+        config = self.config()
+        status = self.text(value, "status")
+        if status not in STATUSES:
+            raise self.fail("status", f"is {status!r}, expected one of {', '.join(STATUSES)}")
+        reason = str(value.get("reason") or "")
+        if status != "ok" and not reason:
+            raise self.fail("reason", f"missing, status is {status!r}")
+        verify = self.mapping("verify", required=status == "ok")
+        samples = self.samples() if status == "ok" else None
+        stages = self.stages(samples.n) if samples else {}
+        if status == "ok" and verify.get("conforms") is not True:
+            # Invariant 1: what is not known to conform shows no speed, whatever the status says.
+            status, samples, stages = "failed", None, {}
+            reason = "does not conform" if verify.get("conforms") is False else "conformity was not checked"
+        per_thread = value.get("per_thread") or []
+        if not isinstance(per_thread, list) or any(not isinstance(entry, dict) for entry in per_thread):
+            raise self.fail("per_thread", "expected an array of objects")
+        median = value.get("median_ms")
+        recorded = value.get("interval_ms")
+        if recorded is not None and not (isinstance(recorded, list) and len(recorded) == 2 and all(map(is_number, recorded))):
+            raise self.fail("interval_ms", "expected [low, high] or null")
+        observed = value.get("threads_observed")
+        return Record(self.line, identity, name, config, status, reason, samples, stages, value.get("stop"), verify,
+                      self.mapping("work"), observed if is_number(observed) else None, tuple(per_thread),
+                      float(median) if is_number(median) else None, tuple(recorded) if recorded else None,
+                      value.get("context"), value)
+
+    def mapping(self, key: str, required: bool = False) -> dict[str, Any]:
+        if required and key not in self.value:
+            raise self.fail(key, "missing")
+        value = self.value.get(key)
+        if value is not None and not isinstance(value, dict):
+            raise self.fail(key, "expected an object")
+        return value or {}
+
+    def config(self) -> Config:
+        if "config" not in self.value:
+            raise self.fail("config", "missing")
+        config = self.mapping("config")
+        for key in ("scene", "kernel", "numeric", "fill", "near", "backend", "isa", "output", "cache"):
+            self.text(config, key, "config.")
+        for key in ("size", "schedule", "chunk", "threads"):
+            if key not in config:
+                raise self.fail(f"config.{key}", "missing")
+        size, threads, chunk = config["size"], config["threads"], config["chunk"]
+        whole = lambda x: isinstance(x, int) and not isinstance(x, bool) and x > 0
+        if not (isinstance(size, list) and len(size) == 2 and all(map(whole, size))):
+            raise self.fail("config.size", f"expected [width, height], found {size!r}")
+        if not whole(threads):
+            raise self.fail("config.threads", f"expected a whole number above 0, found {threads!r}")
+        if chunk is not None and not whole(chunk):
+            raise self.fail("config.chunk", f"expected a whole number above 0 or null, found {chunk!r}")
+        if config["schedule"] is not None:
+            self.text(config, "schedule", "config.")
+        known = {axis.name: config.get(axis.name) for axis in fields(Config)}
+        for key in ("scene_hash", "binding", "wait_policy", "runtime", "tile"):
+            if isinstance(known[key], (list, dict)):  # a tile of [32, 32], say: kept as text, it is only a label
+                known[key] = json.dumps(known[key])
+        return Config(**(known | {"size": tuple(size)}))
+
+    def numbers(self, source: dict[str, Any], key: str, prefix: str = "") -> np.ndarray:
+        if key not in source:
+            raise self.fail(prefix + key, "missing")
+        values = source[key]
+        if not isinstance(values, list) or not all(map(is_number, values)):
+            raise self.fail(prefix + key, "expected an array of numbers")
+        return np.array(values, dtype=float)
+
+    def samples(self) -> Samples:
+        values = self.numbers(self.value, "samples_ms")
+        if len(values) == 0:
+            raise self.fail("samples_ms", "is empty, status is 'ok'")
+        if np.any(values <= 0):
+            raise self.fail("samples_ms", "holds a time that is not above 0")
+        places = []
+        for key in ("launches", "blocks"):
+            place = self.numbers(self.value, key)
+            if len(place) != len(values):
+                raise self.fail(key, f"holds {len(place)} values for {len(values)} samples")
+            places.append(place.astype(int))
+        return Samples(values, *places)
+
+    def stages(self, n: int) -> dict[str, np.ndarray]:
+        source = self.mapping("stages_ms")
+        stages = {}
+        for key in [*STAGES, *(k for k in source if k not in STAGES)]:
+            if source.get(key) is None:
+                continue
+            stages[key] = self.numbers(source, key, "stages_ms.")
+            if len(stages[key]) != n:
+                raise self.fail(f"stages_ms.{key}", f"holds {len(stages[key])} values for {n} samples")
+        return stages

@@ -1,0 +1,290 @@
+"""The statistics of the report. Nothing here assumes a distribution of the times.
+
+Medians carry order-statistic intervals (exact binomial). Ratios are medians of ratios of samples that share a launch and
+a block, because a block meets the same drift; their intervals are bootstrapped over launches, then blocks, because the
+samples of one process share one memory layout and are not independent of each other.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import dataclass, replace
+from typing import Sequence
+
+import numpy as np
+from scipy import stats
+
+CONFIDENCE = 0.95
+RESAMPLES = 2000
+SEED = 20240229  # fixed, so that the same records always give the same report
+MIN_SAMPLES = 6  # below it, [min, max] covers the median with less than 95 %
+MIN_LAUNCHES = 5
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Times of one point in the order they were taken, each with the launch and the block it belongs to."""
+
+    values: np.ndarray
+    launches: np.ndarray
+    blocks: np.ndarray
+
+    @property
+    def n(self) -> int:
+        return len(self.values)
+
+    @property
+    def launch_count(self) -> int:
+        return len(np.unique(self.launches))
+
+    def by_block(self) -> dict[tuple[int, int], float]:
+        cells: dict[tuple[int, int], list[float]] = {}
+        for value, launch, block in zip(self.values, self.launches, self.blocks):
+            cells.setdefault((int(launch), int(block)), []).append(float(value))
+        return {key: float(np.median(cell)) for key, cell in cells.items()}
+
+    def by_launch(self) -> list[np.ndarray]:
+        return [self.values[self.launches == launch] for launch in np.unique(self.launches)]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A value with its 95 % interval; without one (low, high None) where the samples are too few."""
+
+    value: float
+    low: float | None
+    high: float | None
+    n: int
+    kind: str
+    note: str = ""
+
+    @property
+    def has_interval(self) -> bool:
+        return self.low is not None and self.high is not None
+
+    @property
+    def excludes_one(self) -> bool:
+        return self.has_interval and (self.low > 1.0 or self.high < 1.0)
+
+    def scaled(self, factor: float) -> Estimate:
+        scale = lambda x: None if x is None else x * factor
+        return replace(self, value=self.value * factor, low=scale(self.low), high=scale(self.high))
+
+    def inverse(self) -> Estimate:
+        turn = lambda x: None if x is None else 1.0 / x
+        return replace(self, value=1.0 / self.value, low=turn(self.high), high=turn(self.low))
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A point against the fastest of its group: ratio = its time / the time of the fastest."""
+
+    ratio: Estimate
+    p: float
+    p_holm: float
+    superiority: float  # share of sample pairs in which the point is slower: 0.5 none, 1 always
+    test: str
+    verdict: str  # "best", "slower", "same" or "ambiguous"
+
+    @property
+    def distinguishable(self) -> bool:
+        return self.verdict == "slower"
+
+
+def order_ranks(n: int, confidence: float = CONFIDENCE) -> tuple[int, int, float] | None:
+    """Ranks (from 1) of the narrowest symmetric interval for the median, with its exact coverage."""
+    if n < 1 or 1 - 2 * 0.5**n < confidence:
+        return None
+    low = 1
+    while 1 - 2 * stats.binom.cdf(low, n, 0.5) >= confidence:
+        low += 1
+    return low, n + 1 - low, float(1 - 2 * stats.binom.cdf(low - 1, n, 0.5))
+
+
+def order_interval(values: Sequence[float], confidence: float = CONFIDENCE) -> tuple[float, float] | None:
+    ranks = order_ranks(len(values), confidence)
+    if ranks is None:
+        return None
+    ordered = np.sort(np.asarray(values, dtype=float))
+    return float(ordered[ranks[0] - 1]), float(ordered[ranks[1] - 1])
+
+
+def median_estimate(samples: Samples) -> Estimate:
+    """The median; with enough launches its interval lets the launches vary too."""
+    value = float(np.median(samples.values))
+    if samples.launch_count >= MIN_LAUNCHES:
+        low, high = _quantiles(_resampled_medians(samples.by_launch()))
+        return Estimate(value, low, high, samples.n, "bootstrap over launches, then blocks")
+    bounds = order_interval(samples.values)
+    if bounds is None:
+        return Estimate(value, None, None, samples.n, "none", "fewer than 6 samples")
+    return Estimate(value, *bounds, samples.n, "order statistics")
+
+
+def paired(numerator: Samples, denominator: Samples) -> list[np.ndarray]:
+    """Ratios of the samples that share launch and block, one array a launch."""
+    above, below = numerator.by_block(), denominator.by_block()
+    launches: dict[int, list[float]] = {}
+    for key in sorted(above.keys() & below.keys()):
+        launches.setdefault(key[0], []).append(above[key] / below[key])
+    return [np.array(ratios) for ratios in launches.values()]
+
+
+def ratio(numerator: Samples, denominator: Samples) -> Estimate:
+    """The median of paired ratios with its bootstrap interval; unpaired where too few blocks match."""
+    groups = paired(numerator, denominator)
+    pairs = sum(len(group) for group in groups)
+    smaller = min(numerator.n, denominator.n)
+    if pairs >= MIN_SAMPLES or (pairs and pairs == smaller):
+        value = float(np.median(np.concatenate(groups)))
+        if pairs < MIN_SAMPLES:
+            return Estimate(value, None, None, pairs, "none", "fewer than 6 pairs")
+        # One launch has nothing to resample but its blocks, and there the exact interval of the median of n ratios
+        # exists. The percentile bootstrap alone covers less than it says for small n, so the wider of the two counts.
+        low, high = _quantiles(_resampled_medians(groups))
+        kind = "paired, bootstrap over launches, then blocks"
+        if len(groups) == 1:
+            exact = order_interval(groups[0])
+            low, high = min(low, exact[0]), max(high, exact[1])
+            kind = "paired, bootstrap over blocks"
+        return Estimate(value, low, high, pairs, kind)
+    value = float(np.median(numerator.values) / np.median(denominator.values))
+    note = "unpaired: blocks do not match"
+    if smaller < MIN_SAMPLES:
+        return Estimate(value, None, None, smaller, "none", "fewer than 6 samples")
+    above = _resampled_medians(numerator.by_launch())
+    below = _resampled_medians(denominator.by_launch(), SEED + 1)
+    low, high = _quantiles(above / below)
+    return Estimate(value, low, high, smaller, "unpaired bootstrap", note)
+
+
+def efficiency(speedup: Estimate, threads: int) -> Estimate:
+    return speedup.scaled(1.0 / threads)
+
+
+def share(part: np.ndarray, whole: np.ndarray) -> Estimate:
+    """The median of part / whole, sample by sample."""
+    shares = np.asarray(part, dtype=float) / np.asarray(whole, dtype=float)
+    bounds = order_interval(shares)
+    low, high = bounds if bounds else (None, None)
+    return Estimate(float(np.median(shares)), low, high, len(shares), "order statistics" if bounds else "none")
+
+
+def ratio_of_sums(numerators: Sequence[Samples], denominators: Sequence[Samples]) -> Estimate:
+    """Over scenes: the ratio of summed medians, never a mean of ratios. Scenes are fixed, samples are resampled."""
+    above = sum(float(np.median(s.values)) for s in numerators)
+    below = sum(float(np.median(s.values)) for s in denominators)
+    n = min(s.n for s in (*numerators, *denominators))
+    if n < MIN_SAMPLES:
+        return Estimate(above / below, None, None, n, "none", "fewer than 6 samples")
+    # Distinct seeds: points are resampled independently of each other.
+    top = sum(_resampled_medians(s.by_launch(), SEED + 2 * i) for i, s in enumerate(numerators))
+    bottom = sum(_resampled_medians(s.by_launch(), SEED + 2 * i + 1) for i, s in enumerate(denominators))
+    low, high = _quantiles(top / bottom)
+    return Estimate(above / below, low, high, n, "unpaired bootstrap")
+
+
+def harmonic_mean(rates: Sequence[float]) -> float:
+    """The mean of rates over equal amounts of work: total work / total time."""
+    values = np.asarray(rates, dtype=float)
+    if len(values) == 0 or np.any(values <= 0):
+        raise ValueError("a harmonic mean needs positive rates")
+    return float(len(values) / np.sum(1.0 / values))
+
+
+def holm(p_values: Sequence[float]) -> list[float]:
+    """Holm's step-down correction, in the order given."""
+    p = np.asarray(p_values, dtype=float)
+    order = np.argsort(p, kind="stable")
+    adjusted = np.empty_like(p)
+    running = 0.0
+    for rank, index in enumerate(order):
+        running = max(running, min(1.0, (len(p) - rank) * p[index]))
+        adjusted[index] = running
+    return adjusted.tolist()
+
+
+def rank_test(slower: Samples, faster: Samples, family: int) -> tuple[float, str]:
+    """Two-sided p. Signed ranks on pairs, unless n pairs cannot reach significance in a family of this size.
+
+    The choice depends on the counts only, never on the times. Mann-Whitney ignores the pairing, which loses power but
+    is safe: blocks that drift together make its null distribution too wide, not too narrow.
+    """
+    groups = paired(slower, faster)
+    pairs = np.concatenate(groups) if groups else np.array([])
+    reachable = len(pairs) >= MIN_SAMPLES and 2.0 ** (1 - len(pairs)) * family < 1 - CONFIDENCE
+    if reachable:
+        differences = np.log(pairs)
+        if not np.any(differences):
+            return 1.0, "Wilcoxon signed-rank"
+        with warnings.catch_warnings():  # zeros and ties switch to the normal approximation, which is what we want
+            warnings.simplefilter("ignore")
+            return float(stats.wilcoxon(differences).pvalue), "Wilcoxon signed-rank"
+    a, b = slower.values, faster.values
+    if min(len(a), len(b)) < 2:
+        return 1.0, "none"
+    tied = len(np.unique(np.concatenate([a, b]))) < len(a) + len(b)
+    method = "exact" if not tied and len(a) * len(b) <= 625 else "asymptotic"
+    if np.ptp(np.concatenate([a, b])) == 0:
+        return 1.0, "Mann-Whitney"
+    return float(stats.mannwhitneyu(a, b, alternative="two-sided", method=method).pvalue), "Mann-Whitney"
+
+
+def superiority(slower: Samples, faster: Samples) -> float:
+    """Probability that a sample of the first takes longer than one of the second (ties count half)."""
+    difference = slower.values[:, None] - faster.values[None, :]
+    return float((np.sum(difference > 0) + 0.5 * np.sum(difference == 0)) / difference.size)
+
+
+def compare_with_best(group: Sequence[Samples], target: float = 0.02) -> tuple[int, list[Comparison]]:
+    """Index of the lowest median, and every point against it. Slower needs the interval and the corrected test."""
+    best = int(np.argmin([np.median(samples.values) for samples in group]))
+    others = [i for i in range(len(group)) if i != best]
+    tests = {i: rank_test(group[i], group[best], len(others)) for i in others}
+    corrected = dict(zip(others, holm([tests[i][0] for i in others])))
+    comparisons = []
+    for i, samples in enumerate(group):
+        if i == best:
+            one = Estimate(1.0, None, None, samples.n, "none")
+            comparisons.append(Comparison(one, 1.0, 1.0, 0.5, "none", "best"))
+            continue
+        quotient = ratio(samples, group[best])
+        verdict = "ambiguous"
+        if quotient.has_interval and quotient.low > 1.0 and corrected[i] < 1 - CONFIDENCE:
+            verdict = "slower"
+        elif quotient.has_interval and 1 - target < quotient.low and quotient.high < 1 + target:
+            verdict = "same"
+        p, test = tests[i]
+        comparisons.append(Comparison(quotient, p, corrected[i], superiority(samples, group[best]), test, verdict))
+    return best, comparisons
+
+
+def _resampled_medians(groups: Sequence[np.ndarray], seed: int = SEED) -> np.ndarray:
+    """Medians of RESAMPLES draws: launches with replacement (if there are several), then blocks within each."""
+    rng = np.random.default_rng(seed)
+    lengths = np.array([len(group) for group in groups])
+    widest = int(lengths.max())
+    table = np.full((len(groups), widest), np.inf)
+    for row, group in enumerate(groups):
+        table[row, : len(group)] = group
+    if len(groups) == 1:
+        return np.median(table[0][rng.integers(0, widest, (RESAMPLES, widest))], axis=1)
+    launch = rng.integers(0, len(groups), (RESAMPLES, len(groups)))
+    drawn = lengths[launch][:, :, None]
+    block = (rng.random((RESAMPLES, len(groups), widest)) * drawn).astype(int)
+    values = np.where(np.arange(widest) < drawn, table[launch[:, :, None], block], np.inf)
+    values = np.sort(values.reshape(RESAMPLES, -1), axis=1)  # what a shorter launch lacks sorts to the end
+    total = drawn.sum(axis=(1, 2))
+    row = np.arange(RESAMPLES)
+    return 0.5 * (values[row, (total - 1) // 2] + values[row, total // 2])
+
+
+def _quantiles(draws: np.ndarray) -> tuple[float, float]:
+    tail = 100 * (1 - CONFIDENCE) / 2
+    low, high = np.percentile(draws, [tail, 100 - tail])
+    return float(low), float(high)
+
+
+def is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)

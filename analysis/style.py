@@ -1,0 +1,109 @@
+"""One look for all figures: sizes for a text column, colours for colour-blind readers, markers for grey paper."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+
+import matplotlib
+
+matplotlib.use("Agg")  # figures are files; a display is never needed
+
+import matplotlib.pyplot as plt  # noqa: E402
+from matplotlib.axes import Axes  # noqa: E402
+from matplotlib.figure import Figure  # noqa: E402
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator  # noqa: E402
+
+FULL_WIDTH = 6.9  # inches: the text width of an A4 page
+MAX_HEIGHT = 9.0  # with its caption it still fits on that page
+PNG_DPI = 150
+
+# Okabe and Ito's palette without yellow (too light for a thin line on white), the darkest contrasts first.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#7F7F7F")
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+HATCHES = ("", "////", "....", "xxxx", "\\\\\\\\", "++++")
+GREY = "#6B6B6B"
+FAILED = "#9A3412"
+BAND = "#F3F4F6"
+
+RC = {
+    "font.family": "DejaVu Sans", "font.size": 8, "axes.titlesize": 8.5, "axes.labelsize": 8,
+    "xtick.labelsize": 7.5, "ytick.labelsize": 7.5, "legend.fontsize": 7.5, "legend.frameon": False,
+    "axes.spines.top": False, "axes.spines.right": False, "axes.linewidth": 0.7, "axes.axisbelow": True,
+    "grid.color": "#D9D9D9", "grid.linewidth": 0.5, "lines.linewidth": 1.1, "lines.markersize": 4.5,
+    "errorbar.capsize": 1.6, "hatch.linewidth": 0.5, "savefig.facecolor": "white", "figure.facecolor": "white",
+    "pdf.fonttype": 42,
+    # The same records give the same bytes: no random ids, no dates. Text as paths looks alike everywhere.
+    "svg.hashsalt": "rasterbench", "svg.fonttype": "path",
+}
+
+
+@dataclass(frozen=True)
+class Look:
+    colour: str
+    marker: str
+
+
+def look(index: int) -> Look:
+    # Beyond eight the markers shift against the colours, so that a pair does not repeat before 64.
+    return Look(COLOURS[index % 8], MARKERS[(index + index // 8) % 8])
+
+
+def new_figure(width: float, height: float) -> Figure:
+    return plt.figure(figsize=(width, height))
+
+
+def place(figure: Figure, left: float, bottom: float, width: float, height: float, **options) -> Axes:
+    """Axes at a place in inches: margins that hold labels are known, so no layout engine has to guess them."""
+    w, h = figure.get_size_inches()
+    return figure.add_axes((left / w, bottom / h, width / w, height / h), **options)
+
+
+def text_width(texts: list[str], size: float, bold: bool = False) -> float:
+    """Width in inches of the widest text."""
+    from matplotlib.font_manager import FontProperties
+    from matplotlib.textpath import TextPath
+
+    font = FontProperties(family="DejaVu Sans", weight="bold" if bold else "normal")
+    widest = max(texts, key=len, default="")
+    candidates = {t for t in texts if len(t) > 0.8 * len(widest)}
+    return max((TextPath((0, 0), t, size=size, prop=font).get_extents().width for t in candidates if t.strip()),
+               default=0.0) / 72
+
+
+def legend_columns(labels: list[str], width: float = FULL_WIDTH) -> int:
+    """As many columns as fit into the width; a handle and its gaps take about 0.55 inches."""
+    return max(1, min(len(labels), int(width / (text_width(labels, 7.5) + 0.6)))) if labels else 1
+
+
+def plain(value: float, _position: int = 0) -> str:
+    """Tick labels such as 0.2, 1, 20, 5000 instead of powers of ten."""
+    return f"{value:.10f}".rstrip("0").rstrip(".") if value < 1 else f"{value:g}" if value < 1e6 else f"{value:.0e}"
+
+
+def number_axis(axes: Axes, low: float, high: float, log: bool, name: str = "x") -> None:
+    """Ticks that say enough: on a log axis at least two labels, more where the range is short."""
+    axis = axes.xaxis if name == "x" else axes.yaxis
+    limits = axes.set_xlim if name == "x" else axes.set_ylim
+    if log:
+        (axes.set_xscale if name == "x" else axes.set_yscale)("log")
+        limits(low / 1.25, high * 1.25)
+        decades = high / low
+        axis.set_major_locator(LogLocator(subs=(1, 2, 5) if decades < 300 else (1,), numticks=20))
+        axis.set_minor_locator(NullLocator())
+        axis.set_minor_formatter(NullFormatter())
+    else:
+        limits(0, high * 1.08)
+        axis.set_major_locator(MaxNLocator(6))
+    axis.set_major_formatter(FuncFormatter(plain))
+
+
+def outputs(figure: Figure) -> dict[str, bytes]:
+    """The figure as svg, pdf and png, then closed."""
+    files = {}
+    for kind, metadata in (("svg", {"Date": None}), ("pdf", {"CreationDate": None}), ("png", {})):
+        buffer = io.BytesIO()
+        figure.savefig(buffer, format=kind, dpi=PNG_DPI, metadata=metadata)
+        files[kind] = buffer.getvalue()
+    plt.close(figure)
+    return files

@@ -1,0 +1,138 @@
+#include "execution/execution.h"
+
+#include <dlfcn.h>
+#include <fmt/format.h>
+#include <sched.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <set>
+#include <thread>
+#if defined(__SSE2__)
+#include <xmmintrin.h>
+#endif
+
+#include "base/error.h"
+#include "base/suggest.h"
+
+namespace rasterbench {
+namespace {
+
+std::vector<Schedule>& registry() {
+  static std::vector<Schedule> all;
+  return all;
+}
+
+bool flushes_denormals() {
+#if defined(__SSE2__)
+  return (_mm_getcsr() & 0x8040u) != 0;  // FTZ | DAZ
+#else
+  return false;
+#endif
+}
+
+}  // namespace
+
+std::string to_string(const ExecutionConfig& config) {
+  if (config.schedule.empty()) return config.backend;
+  if (!config.chunk) return fmt::format("{}:{}", config.backend, config.schedule);
+  return fmt::format("{}:{},{}", config.backend, config.schedule, *config.chunk);
+}
+
+Execution::Execution(const ExecutionConfig& config)
+    : config_(config), tally_(static_cast<std::size_t>(config.threads)) {}
+
+void Execution::reset_tally() { std::fill(tally_.begin(), tally_.end(), WorkerTally{}); }
+
+double Execution::now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+ObservedThreads observe_threads(Execution& execution) {
+  using Clock = std::chrono::steady_clock;
+  const int wanted = execution.threads();
+  std::atomic<int> arrived{0};
+  std::atomic<bool> flushed{false};
+  std::vector<int> cpu_of(static_cast<std::size_t>(wanted), -1);
+  const auto deadline = Clock::now() + std::chrono::seconds(2);
+  execution.uniform_loop(wanted, [&](std::int64_t, int worker) {
+    int& cpu = cpu_of[static_cast<std::size_t>(worker)];
+    if (cpu == -1) arrived.fetch_add(1);
+    cpu = std::max(0, sched_getcpu());
+    if (flushes_denormals()) flushed = true;
+    // Nobody leaves before all are there, so that one thread cannot do the work of two.
+    while (arrived.load() < wanted && Clock::now() < deadline) std::this_thread::yield();
+  });
+  ObservedThreads observed;
+  observed.count = arrived.load();
+  observed.denormals_flushed = flushed;
+  for (const int cpu : cpu_of)
+    if (cpu >= 0) observed.cpus.push_back(cpu);
+  return observed;
+}
+
+std::span<const Schedule> schedules() { return registry(); }
+
+std::vector<std::string> backends() {
+  std::vector<std::string> names;
+  for (const Schedule& schedule : registry())
+    if (std::find(names.begin(), names.end(), schedule.backend) == names.end())
+      names.push_back(schedule.backend);
+  return names;
+}
+
+const Schedule& find_schedule(const ExecutionConfig& config) {
+  const std::vector<std::string> known_backends = backends();
+  if (std::find(known_backends.begin(), known_backends.end(), config.backend) == known_backends.end())
+    throw InputError({.field = "backend"}, unknown_name("backend", config.backend, known_backends));
+  std::vector<std::string> names;
+  for (const Schedule& schedule : registry()) {
+    if (schedule.backend != config.backend) continue;
+    if (schedule.name == config.schedule) {
+      if (config.chunk && schedule.chunk.empty())
+        throw InputError(
+            {.field = "chunk"},
+            fmt::format("{} takes no chunk", to_string({config.backend, config.schedule, {}, 1})));
+      if (config.chunk && *config.chunk < 1) throw InputError({.field = "chunk"}, "must be at least 1");
+      return schedule;
+    }
+    names.push_back(schedule.name);
+  }
+  throw InputError({.field = "schedule"},
+                   config.backend == "serial"
+                       ? "serial takes no schedule"
+                       : unknown_name(config.backend + " schedule", config.schedule, names));
+}
+
+std::unique_ptr<Execution> make_execution(const ExecutionConfig& config) {
+  const Schedule& schedule = find_schedule(config);
+  if (config.threads < 1) throw InputError({.field = "threads"}, "must be at least 1");
+  if (config.backend == "serial" && config.threads != 1)
+    throw InputError({.field = "threads"}, "serial runs on one thread");
+  return schedule.make(config);
+}
+
+ScheduleRegistration::ScheduleRegistration(Schedule schedule) { registry().push_back(std::move(schedule)); }
+
+int available_cpus() {
+  // OMP_PROC_BIND narrows the mask of the main thread once the OpenMP runtime is up: read it once, before
+  // that.
+  static const int count = [] {
+    cpu_set_t mask;
+    CPU_ZERO(&mask);
+    if (sched_getaffinity(0, sizeof mask, &mask) != 0)
+      return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+    return CPU_COUNT(&mask);
+  }();
+  return count;
+}
+
+std::string openmp_runtime() {
+  // Only LLVM's runtime exports the Intel interface; libgomp exports its own.
+  if (dlsym(RTLD_DEFAULT, "kmp_get_blocktime")) return "libomp";
+  if (dlsym(RTLD_DEFAULT, "GOMP_parallel")) return "libgomp";
+  return "unknown";
+}
+
+}  // namespace rasterbench

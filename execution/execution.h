@@ -1,0 +1,109 @@
+// An execution: how the iterations of a loop are dealt to threads. Backend + schedule (or partitioner) +
+// chunk (or grain) + threads, all chosen at run time; the loop body is the same code under every one of them.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/function_ref.h"
+
+namespace rasterbench {
+
+/// What to run a loop with. `chunk` empty: the runtime's own default.
+struct ExecutionConfig {
+  std::string backend = "serial";
+  std::string schedule;  ///< empty for serial
+  std::optional<int> chunk;
+  int threads = 1;
+};
+
+/// "serial", "openmp:static", "openmp:dynamic,16", "tbb:auto".
+std::string to_string(const ExecutionConfig& config);
+
+/// One iteration of a loop, run by one of the workers 0 .. threads-1. Must not throw.
+using LoopBody = FunctionRef<void(std::int64_t iteration, int worker)>;
+
+/// What one worker did since the last reset. Padded: each worker writes its own.
+struct alignas(64) WorkerTally {
+  std::int64_t iterations = 0;
+  double busy_seconds = 0;  ///< between its first and last stamp in each loop
+  int cpu = -1;             ///< where it ran last
+};
+
+/// Runs loops. One object belongs to one point: what a runtime learns in one frame (an affinity) never
+/// reaches another.
+class Execution {
+ public:
+  explicit Execution(const ExecutionConfig& config);
+  virtual ~Execution() = default;
+  Execution(const Execution&) = delete;
+  Execution& operator=(const Execution&) = delete;
+
+  const ExecutionConfig& config() const { return config_; }
+  int threads() const { return config_.threads; }
+
+  /// The loop under study: iterations 0 .. n-1 under the configured schedule. Returns when all are done.
+  virtual void loop(std::int64_t n, LoopBody body) = 0;
+
+  /// Loops that every strategy shares (clear, geometry, binning, resolve): the same backend and threads,
+  /// dealt evenly, so that a schedule under study changes the loop under study only.
+  virtual void uniform_loop(std::int64_t n, LoopBody body) = 0;
+
+  std::span<const WorkerTally> tally() const { return tally_; }
+  void reset_tally();
+
+ protected:
+  /// Seconds of a monotonic clock.
+  static double now();
+  WorkerTally& tally_of(int worker) { return tally_[static_cast<std::size_t>(worker)]; }
+
+ private:
+  ExecutionConfig config_;
+  std::vector<WorkerTally> tally_;
+};
+
+/// Which threads really run: measured by a loop whose iterations wait for each other.
+struct ObservedThreads {
+  int count = 0;
+  std::vector<int> cpus;           ///< CPU of each observed worker
+  bool denormals_flushed = false;  ///< some worker has FTZ or DAZ set in MXCSR: the modes' bits would change
+};
+ObservedThreads observe_threads(Execution& execution);
+
+/// A schedule of a backend: registered beside its function, in its own file (adding one is adding one file).
+struct Schedule {
+  std::string backend;
+  std::string name;     ///< empty for serial
+  std::string meaning;  ///< one line
+  std::string chunk;    ///< what its chunk means, or empty if it takes none
+  std::function<std::unique_ptr<Execution>(const ExecutionConfig&)> make;
+};
+
+/// Every schedule of this build, in the order of registration.
+std::span<const Schedule> schedules();
+
+/// Names of the backends of this build, and those left out of it with the reason.
+std::vector<std::string> backends();
+
+/// Throws InputError (with a did-you-mean) unless this build can run `config`.
+const Schedule& find_schedule(const ExecutionConfig& config);
+
+std::unique_ptr<Execution> make_execution(const ExecutionConfig& config);
+
+/// Puts a schedule into the list; used by a namespace-scope constant in the schedule's file.
+struct ScheduleRegistration {
+  explicit ScheduleRegistration(Schedule schedule);
+};
+
+/// CPUs that this process may run on (its affinity mask when it started).
+int available_cpus();
+
+/// Name and version of the OpenMP runtime that is loaded, e.g. "libgomp" or "libomp".
+std::string openmp_runtime();
+
+}  // namespace rasterbench

@@ -1,0 +1,34 @@
+// Serial: one thread, iterations in order. The base of every speedup.
+#include <sched.h>
+
+#include "execution/execution.h"
+
+namespace rasterbench {
+namespace {
+
+class Serial final : public Execution {
+ public:
+  using Execution::Execution;
+
+  void loop(std::int64_t n, LoopBody body) override {
+    WorkerTally& tally = tally_of(0);
+    const double begin = now();
+    for (std::int64_t i = 0; i < n; ++i) body(i, 0);
+    tally.busy_seconds += now() - begin;
+    tally.iterations += n;
+    tally.cpu = sched_getcpu();
+  }
+
+  void uniform_loop(std::int64_t n, LoopBody body) override { loop(n, body); }
+};
+
+const ScheduleRegistration kSerial({.backend = "serial",
+                                    .name = "",
+                                    .meaning = "one thread, iterations in order",
+                                    .chunk = "",
+                                    .make = [](const ExecutionConfig& config) -> std::unique_ptr<Execution> {
+                                      return std::make_unique<Serial>(config);
+                                    }});
+
+}  // namespace
+}  // namespace rasterbench

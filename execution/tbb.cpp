@@ -1,0 +1,93 @@
+// oneTBB: parallel_for over a blocked_range with each of its partitioners.
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/partitioner.h>
+#include <oneapi/tbb/task_arena.h>
+#include <sched.h>
+
+#include <algorithm>
+#include <atomic>
+
+#include "execution/execution.h"
+
+namespace rasterbench {
+namespace {
+
+using Range = oneapi::tbb::blocked_range<std::int64_t>;
+
+template <class Partitioner>
+class Tbb final : public Execution {
+ public:
+  explicit Tbb(const ExecutionConfig& config)
+      : Execution(config),
+        // Without it an arena never gets more workers than there are CPUs (--oversubscribe).
+        parallelism_(oneapi::tbb::global_control::max_allowed_parallelism,
+                     static_cast<std::size_t>(std::max(config.threads, available_cpus()))),
+        arena_(config.threads),
+        stamps_(static_cast<std::size_t>(config.threads)) {}
+
+  void loop(std::int64_t n, LoopBody body) override {
+    run(n, static_cast<std::size_t>(config().chunk.value_or(1)), body, partitioner_);
+  }
+  void uniform_loop(std::int64_t n, LoopBody body) override {
+    oneapi::tbb::static_partitioner even;
+    run(n, 1, body, even);
+  }
+
+ private:
+  /// When a worker was last seen in the loop `epoch`. One stamp per range, at its end, and one more at a
+  /// worker's first.
+  struct alignas(64) Stamp {
+    std::int64_t epoch = -1;
+    double last = 0;
+  };
+
+  template <class AnyPartitioner>
+  void run(std::int64_t n, std::size_t grain, LoopBody body, AnyPartitioner& partitioner) {
+    ++epoch_;
+    const auto chunk = [&](const Range& range) {
+      const int worker = oneapi::tbb::this_task_arena::current_thread_index();
+      Stamp& stamp = stamps_[static_cast<std::size_t>(worker)];
+      WorkerTally& tally = tally_of(worker);
+      if (stamp.epoch != epoch_) stamp = {.epoch = epoch_, .last = now()};
+      for (std::int64_t i = range.begin(); i != range.end(); ++i) body(i, worker);
+      const double end = now();
+      tally.busy_seconds += end - stamp.last;
+      tally.iterations += static_cast<std::int64_t>(range.size());
+      tally.cpu = sched_getcpu();
+      stamp.last = end;
+    };
+    arena_.execute([&] { oneapi::tbb::parallel_for(Range(0, n, grain), chunk, partitioner); });
+  }
+
+  oneapi::tbb::global_control parallelism_;
+  oneapi::tbb::task_arena arena_;
+  Partitioner
+      partitioner_;  // lives as long as the point: affinity learns over its frames, and over no others
+  std::vector<Stamp> stamps_;
+  std::int64_t epoch_ = 0;
+};
+
+template <class Partitioner>
+Schedule schedule(std::string name, std::string meaning) {
+  return {.backend = "tbb",
+          .name = std::move(name),
+          .meaning = std::move(meaning),
+          .chunk = "grain: ranges of at most this many iterations are not split; default 1",
+          .make = [](const ExecutionConfig& config) -> std::unique_ptr<Execution> {
+            return std::make_unique<Tbb<Partitioner>>(config);
+          }};
+}
+
+const ScheduleRegistration kAuto(
+    schedule<oneapi::tbb::auto_partitioner>("auto", "splits a range when a thread comes to steal"));
+const ScheduleRegistration kSimple(
+    schedule<oneapi::tbb::simple_partitioner>("simple", "splits down to the grain, always"));
+const ScheduleRegistration kStatic(schedule<oneapi::tbb::static_partitioner>(
+    "static", "one range per thread, divided before the loop starts"));
+const ScheduleRegistration kAffinity(schedule<oneapi::tbb::affinity_partitioner>(
+    "affinity", "like auto, and gives each thread the range that it had in the frame before"));
+
+}  // namespace
+}  // namespace rasterbench

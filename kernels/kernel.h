@@ -1,0 +1,87 @@
+// Kernels: the strategies under comparison. Each is one file in this folder that registers itself; see
+// bounding_box.cpp for the shape of one.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "numeric/modes.h"
+#include "pipeline/frame_renderer.h"
+
+namespace rasterbench {
+
+/// What a kernel declares of itself.
+struct KernelInfo {
+  std::string_view name;
+  std::string_view parallel_unit;    ///< what one iteration of the loop under study is
+  std::string_view synchronisation;  ///< how threads keep out of each other's pixels
+  std::string_view work;  ///< complexity: T triangles, P pixels of the image, B pixels of all bounding boxes
+  bool tests_every_pixel = false;  ///< costs T x P edge tests, so that a study has to predict its time
+  bool has_tiles = false;          ///< FrameSettings::tile matters to its speed
+  bool hidden = false;             ///< not listed: a canary
+};
+
+/// A registered kernel and the numeric modes that can carry it.
+class Kernel {
+ public:
+  using Make = std::function<std::unique_ptr<Renderer>(const RendererSetup&)>;
+  struct Variant {
+    std::string_view mode;
+    Make make;  ///< empty where the mode does not suit; `reason` says why
+    std::string_view reason;
+  };
+
+  Kernel(const KernelInfo& info, std::vector<Variant> variants)
+      : info_(info), variants_(std::move(variants)) {}
+  const KernelInfo& info() const { return info_; }
+  std::span<const Variant> variants() const { return variants_; }
+
+  /// The variant for a mode of the list.
+  const Variant& variant(std::string_view mode) const;
+
+ private:
+  KernelInfo info_;
+  std::vector<Variant> variants_;
+};
+
+/// Every kernel, hidden ones included, in the order of the CMake list.
+std::span<const Kernel> kernels();
+
+/// Throws InputError with a did-you-mean.
+const Kernel& find_kernel(std::string_view name);
+
+/// The one place where a kernel, a mode and a setup become a renderer. Throws InputError where the mode does
+/// not suit.
+std::unique_ptr<Renderer> make_renderer(std::string_view kernel, std::string_view mode,
+                                        const RendererSetup& setup);
+
+void register_kernel(Kernel kernel);
+
+/// Registers `Definition`, which has a KernelInfo `kInfo` and a nested class template `Strategy<Mode>`, for
+/// every mode that the constraints on Strategy admit.
+template <class Definition>
+struct KernelRegistration {
+  KernelRegistration() {
+    std::vector<Kernel::Variant> variants;
+    for_each_mode([&]<NumericMode Mode>() {
+      if constexpr (requires { typename Definition::template Strategy<Mode>; }) {
+        variants.push_back({Mode::kInfo.name,
+                            [](const RendererSetup& setup) -> std::unique_ptr<Renderer> {
+                              using Strategy = typename Definition::template Strategy<Mode>;
+                              return std::make_unique<FrameRenderer<Mode, Strategy>>(setup);
+                            },
+                            {}});
+      } else {
+        variants.push_back(
+            {Mode::kInfo.name, {}, "needs a key of one 64-bit word, which this mode's depth does not fit"});
+      }
+    });
+    register_kernel(Kernel(Definition::kInfo, std::move(variants)));
+  }
+};
+
+}  // namespace rasterbench

@@ -1,0 +1,195 @@
+// Invariant 0: every kernel, execution, tile size and order of the screen triangles equals the scalar
+// specification of its mode bit for bit; and the canary does not.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "kernels/kernel.h"
+#include "reference/specification.h"
+#include "scene/generator.h"
+
+namespace rasterbench {
+namespace {
+
+struct TestScene {
+  std::string name;
+  Scene scene;
+  int width, height;
+};
+
+Triangle triangle(Vec3 a, Vec3 b, Vec3 c) { return {a, b, c}; }
+
+/// A scene of hand-made triangles, seen from (0, 0, 3) with a field of view of 90 degrees and near 1, far 10.
+Scene from_front(std::vector<Triangle> triangles) {
+  Scene scene;
+  scene.model.triangles = std::move(triangles);
+  scene.parameters.camera = {0, 0, 3};
+  scene.parameters.theta = 1.5707963267948966;
+  scene.parameters.near_plane = 1;
+  scene.parameters.far_plane = 10;
+  return scene;
+}
+
+Scene crossing_near() {
+  Random random(5);
+  const auto point = [&] {
+    return Vec3{static_cast<float>(random.uniform(-3, 3)), static_cast<float>(random.uniform(-3, 3)),
+                static_cast<float>(random.uniform(-2, 6))};
+  };
+  std::vector<Triangle> triangles;
+  for (int i = 0; i < 200; ++i) triangles.push_back(triangle(point(), point(), point()));
+  return from_front(triangles);
+}
+
+/// Triangles whose corners and edges lie on pixel centres, each twice with opposite windings: ties
+/// everywhere.
+Scene lattice() {
+  std::vector<Triangle> triangles;
+  const auto at = [](int i) {
+    return static_cast<float>(i) * 0.375f - 3.0f;
+  };  // 16 cells over 6 units: 2 px of a 32 px image
+  for (int i = 0; i < 16; ++i)
+    for (int j = 0; j < 16; ++j) {
+      const Vec3 a{at(j), at(i), 0}, b{at(j + 1), at(i), 0}, c{at(j + 1), at(i + 1), 0},
+          d{at(j), at(i + 1), 0};
+      for (const Triangle& t : {triangle(a, b, c), triangle(a, c, d), triangle(c, b, a), triangle(d, c, a)})
+        triangles.push_back(t);
+    }
+  return from_front(triangles);
+}
+
+Scene nasty() {
+  const float inf = std::numeric_limits<float>::infinity(), nan = std::numeric_limits<float>::quiet_NaN();
+  return from_front({triangle({0, 0, 0}, {0, 0, 0}, {1, 1, 0}), triangle({0, 0, 0}, {0, 0, 0}, {0, 0, 0}),
+                     triangle({-1, -1, 0}, {0, 0, 0}, {1, 1, 0}), triangle({nan, 0, 0}, {1, 0, 0}, {0, 1, 0}),
+                     triangle({inf, 0, 0}, {1, 0, 0}, {0, 1, 0}),
+                     triangle({-1e9f, -1e9f, 0}, {1e9f, 0, 0}, {0, 1e9f, 0}),
+                     triangle({-1e30f, -1, 0}, {1e30f, 0, 0}, {0, 1e30f, -1}),
+                     triangle({1e-42f, 0, 0}, {0, 1e-42f, 0}, {1, 1, 0}),
+                     triangle({-1, 0.00001f, 0.5f}, {1, 0, 0.5f}, {1, 0.00002f, 0.5f}),
+                     triangle({-0.0f, -0.0f, 1}, {0.3f, 0, 1}, {0, 0.3f, 1})});
+}
+
+std::vector<TestScene> test_scenes() {
+  std::vector<TestScene> scenes;
+  const Scene confetti = generate("confetti:triangles=600,size=9,distribution=heavy,seed=3");
+  scenes.push_back({"confetti", confetti, 160, 90});
+  scenes.push_back({"confetti 1x1", confetti, 1, 1});
+  scenes.push_back({"confetti 7x5", confetti, 7, 5});
+  scenes.push_back({"confetti 1000x1", confetti, 1000, 1});
+  scenes.push_back({"teapot", generate("teapot:triangles=2000"), 131, 97});
+  scenes.push_back({"layers", generate("layers:triangles=300,depth=3"), 100, 60});
+  scenes.push_back({"terrain", generate("terrain:triangles=2000,seed=2"), 120, 67});
+  scenes.push_back({"crossing near", crossing_near(), 120, 80});
+  scenes.push_back({"lattice", lattice(), 32, 32});
+  scenes.push_back({"nasty", nasty(), 64, 48});
+  scenes.push_back({"behind", from_front({triangle({0, 0, 4}, {1, 0, 5}, {0, 1, 4})}), 20, 20});
+  scenes.push_back({"empty", from_front({}), 20, 20});
+  return scenes;
+}
+
+std::vector<ExecutionConfig> test_executions() {
+  std::vector<ExecutionConfig> all;
+  for (const Schedule& schedule : schedules()) {
+    if (schedule.backend == "serial") {
+      all.push_back({});
+      continue;
+    }
+    all.push_back({schedule.backend, schedule.name, {}, 2});
+    if (!schedule.chunk.empty()) all.push_back({schedule.backend, schedule.name, 5, 3});
+  }
+  return all;
+}
+
+class EveryKernel : public testing::TestWithParam<std::tuple<std::string, std::string>> {};
+
+TEST_P(EveryKernel, EqualsTheSpecification) {
+  const auto& [kernel, mode] = GetParam();
+  if (const auto& variant = find_kernel(kernel).variant(mode); !variant.make)
+    GTEST_SKIP() << kernel << " in " << mode << ": " << variant.reason;
+  for (const TestScene& test : test_scenes())
+    for (const FillRule fill : {FillRule::kClosed, FillRule::kTopLeft}) {
+      FrameSettings settings{.width = test.width, .height = test.height, .fill = fill};
+      const Picture expected = render_specification(test.scene, mode, settings);
+      int variant = 0;
+      for (const ExecutionConfig& execution : test_executions()) {
+        // Vary what must not matter along with the execution; every other one permutes the screen triangles.
+        settings.tile = std::array{64, 8, 1000, 13}[static_cast<std::size_t>(variant % 4)];
+        const std::uint64_t seed = variant % 2 == 0 ? 0 : static_cast<std::uint64_t>(variant);
+        ++variant;
+        const auto renderer = make_renderer(kernel, mode, {&test.scene, settings, execution, seed});
+        for (int frame = 0; frame < 2;
+             ++frame) {  // the second frame meets what the first left in the buffers
+          renderer->draw();
+          ASSERT_EQ(differing_pixels(picture_of(*renderer, settings), expected), 0) << fmt::format(
+              "{} {} {} on {}, {}, tile {}, permutation {}, frame {}", kernel, mode, to_string(execution),
+              test.name, fill == FillRule::kClosed ? "closed" : "top-left", settings.tile, seed, frame);
+        }
+      }
+    }
+}
+
+std::vector<std::string> kernel_names() {
+  std::vector<std::string> names;
+  for (const Kernel& kernel : kernels())
+    if (!kernel.info().hidden) names.emplace_back(kernel.info().name);
+  return names;
+}
+
+std::vector<std::string> mode_names() {
+  std::vector<std::string> names;
+  for (const ModeInfo& info : mode_infos()) names.emplace_back(info.name);
+  return names;
+}
+
+INSTANTIATE_TEST_SUITE_P(All, EveryKernel,
+                         testing::Combine(testing::ValuesIn(kernel_names()), testing::ValuesIn(mode_names())),
+                         [](const auto& test) {
+                           return std::get<0>(test.param) + "_" + std::get<1>(test.param);
+                         });
+
+TEST(Kernels, LastWinsTieRule) {
+  const Scene scene = lattice();
+  for (const TieRule tie : {TieRule::kFirst, TieRule::kLast}) {
+    FrameSettings settings{.width = 32, .height = 32, .tie = tie};
+    const auto renderer = make_renderer("triangle_atomics", "f32", {&scene, settings, {}});
+    renderer->draw();
+    const Picture expected = render_specification(scene, "f32", settings);
+    EXPECT_EQ(differing_pixels(picture_of(*renderer, settings), expected), 0);
+    // Four triangles of each cell lie in one plane: the first of them has the winding (a, b, c), the last (d,
+    // c, a).
+    EXPECT_EQ(expected.ids[0] % 4 < 2, tie == TieRule::kFirst);
+  }
+}
+
+TEST(Kernels, CanaryDrawsNothingAndDiffers) {
+  const Scene scene = generate("teapot:triangles=2000");
+  const FrameSettings settings{.width = 64, .height = 36};
+  const auto renderer = make_renderer("null", "f32", {&scene, settings, {}});
+  renderer->draw();
+  EXPECT_GT(differing_pixels(picture_of(*renderer, settings), render_specification(scene, "f32", settings)),
+            100);
+}
+
+TEST(Kernels, UnknownNamesSuggest) {
+  EXPECT_THROW(
+      {
+        try {
+          find_kernel("tile_paralel");
+        } catch (const InputError& error) {
+          EXPECT_STREQ(error.what(), "kernel: unknown kernel 'tile_paralel'; did you mean 'tile_parallel'?");
+          throw;
+        }
+      },
+      InputError);
+  EXPECT_THROW(find_kernel("tile_parallel").variant("f23"), InputError);
+}
+
+TEST(Kernels, AtomicsSkipModesWithoutAPackedKey) {
+  const Scene scene = from_front({});
+  const FrameSettings settings{.width = 4, .height = 4};
+  EXPECT_THROW(make_renderer("triangle_atomics", "f64", {&scene, settings, {}}), InputError);
+}
+
+}  // namespace
+}  // namespace rasterbench

@@ -1,0 +1,125 @@
+// A frame: world triangles in memory -> RGBA8 + float32 depth in memory, in stages, around one kernel.
+//
+//   clear     every key of the visibility buffer            (rows)
+//   geometry  world triangles -> screen triangles           (batches of triangles)
+//   raster    screen triangles -> visibility buffer         (the kernel; the loop under study)
+//   resolve   visibility buffer -> colours and depths       (rows)
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/buffer.h"
+#include "execution/execution.h"
+#include "numeric/mode.h"
+#include "pipeline/geometry.h"
+#include "scene/scene.h"
+
+namespace rasterbench {
+
+/// Everything that the picture depends on besides the scene and the numeric mode.
+struct FrameSettings {
+  int width = 0;
+  int height = 0;
+  FillRule fill = FillRule::kClosed;
+  TieRule tie = TieRule::kFirst;
+  GeometryOptions geometry = {};
+  int tile = 64;  ///< side of the tiles in pixels, for the kernels that have tiles; never changes the picture
+
+  PixelBox bounds() const { return {0, 0, width, height}; }
+  std::size_t pixels() const { return static_cast<std::size_t>(width) * static_cast<std::size_t>(height); }
+};
+
+/// rank and id: each is the other's image under the same bijection.
+inline std::uint32_t swap_rank(TieRule tie, std::int64_t triangle_count, std::uint32_t rank_or_id) {
+  return tie == TieRule::kFirst ? rank_or_id : static_cast<std::uint32_t>(triangle_count - 1 - rank_or_id);
+}
+
+/// What a staged kernel is given: the screen triangles, of which those with id < 0 draw nothing.
+template <NumericMode Mode>
+struct StagedTriangles {
+  std::span<const ScreenTriangle<typename Mode::Real>> triangles;
+  const FrameSettings& settings;
+  std::int64_t triangle_count;  ///< of the scene: ids are below it
+
+  std::int64_t size() const { return static_cast<std::int64_t>(triangles.size()); }
+
+  /// Set-up of triangle i; its box is empty where it draws nothing and lies within the image otherwise.
+  typename Mode::Prepared prepare(std::int64_t i) const {
+    const auto& triangle = triangles[static_cast<std::size_t>(i)];
+    if (triangle.id < 0) return {};
+    auto prepared =
+        Mode::prepare(triangle, settings.fill,
+                      swap_rank(settings.tie, triangle_count, static_cast<std::uint32_t>(triangle.id)));
+    prepared.box = intersect(prepared.box, settings.bounds());
+    return prepared;
+  }
+};
+
+/// The visibility buffer: per pixel the smallest key so far; row 0 on top.
+template <NumericMode Mode>
+struct Visibility {
+  std::span<typename Mode::Key> keys;
+  int width;
+
+  typename Mode::Key* row(std::int64_t y) { return keys.data() + y * width; }
+  typename Mode::Key& at(std::int64_t x, std::int64_t y) { return row(y)[x]; }
+};
+
+/// Seconds per stage; a stage that a kernel does not have would be negative.
+struct StageSeconds {
+  double clear = 0, geometry = 0, raster = 0, resolve = 0;
+  double total() const { return clear + geometry + raster + resolve; }
+};
+
+/// What one frame did, besides its picture.
+struct FrameReport {
+  StageSeconds seconds;
+  GeometryCounts counts;
+  std::vector<WorkerTally> raster_tally;  ///< per worker, of the raster stage
+};
+
+/// Draws frames of one point: one scene, kernel, numeric mode and execution. Owns every buffer of the point
+/// (Invariant 4).
+class Renderer {
+ public:
+  virtual ~Renderer() = default;
+
+  /// Draws one frame; the picture stays valid until the next one.
+  virtual const FrameReport& draw() = 0;
+
+  /// RGBA8 (red in the lowest byte, alpha 255) and depth (1 = background), row 0 on top.
+  virtual std::span<const std::uint32_t> colours() const = 0;
+  virtual std::span<const float> depths() const = 0;
+
+  /// Ids of the visible triangles of the last frame, -1 = background: read back from the keys, outside the
+  /// timed frame.
+  virtual std::vector<std::int32_t> ids() const = 0;
+
+  /// Bytes of all buffers of the point.
+  virtual std::size_t bytes() const = 0;
+};
+
+/// What a renderer is made of. The scene must outlive it.
+struct RendererSetup {
+  const Scene* scene;
+  FrameSettings settings;
+  ExecutionConfig execution;
+  /// Not 0: the screen triangles reach the kernel in a random order of this seed. For verification: the
+  /// picture must not care.
+  std::uint64_t permutation_seed = 0;
+};
+
+/// The camera of `scene` for an image of the size in `settings`.
+inline Camera sized_camera(const Scene& scene, const FrameSettings& settings) {
+  SceneParameters parameters = scene.parameters;
+  parameters.width = settings.width;
+  parameters.height = settings.height;
+  return make_camera(parameters);
+}
+
+}  // namespace rasterbench

@@ -1,0 +1,165 @@
+// The stages of a frame around one staged kernel in one numeric mode.
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+
+#include "pipeline/frame.h"
+#include "pipeline/resolve.h"
+#include "scene/generator.h"
+
+namespace rasterbench {
+
+/// The geometry stage as a parallel loop: the screen triangles of a scene in one array. Slot i < T belongs to
+/// triangle i; further pieces of clipped triangles follow in the order of their ids, whatever thread made
+/// them.
+template <class Real>
+class ScreenTriangles {
+ public:
+  explicit ScreenTriangles(std::size_t triangle_count)
+      : triangle_count_(triangle_count),
+        batches_((triangle_count + kBatch - 1) / kBatch),
+        slots_(triangle_count, "the array of screen triangles"),
+        extra_(batches_),
+        counts_(batches_) {}
+
+  void transform(std::span<const Triangle> triangles, const ScreenTransform& transform,
+                 const GeometryOptions& options, Execution& execution) {
+    execution.uniform_loop(static_cast<std::int64_t>(batches_), [&](std::int64_t batch, int) {
+      const auto b = static_cast<std::size_t>(batch);
+      const std::size_t first = b * kBatch;
+      extra_[b].clear();
+      counts_[b] = {};
+      transform_triangles<Real>(triangles.subspan(first, std::min(kBatch, triangle_count_ - first)),
+                                static_cast<std::int32_t>(first), transform, options, slots_.data() + first,
+                                extra_[b], counts_[b]);
+    });
+    append_extra();
+  }
+
+  /// Puts the triangles into a random order (Fisher & Yates); each keeps its id.
+  void shuffle(std::uint64_t seed) {
+    Random random(seed);
+    for (std::size_t i = size_; i > 1; --i) std::swap(slots_[i - 1], slots_[random.bits() % i]);
+  }
+
+  std::span<const ScreenTriangle<Real>> span() const { return slots_.span().first(size_); }
+  std::size_t bytes() const { return slots_.size() * sizeof(ScreenTriangle<Real>); }
+
+  GeometryCounts counts() const {
+    GeometryCounts sum;
+    for (const GeometryCounts& c : counts_) sum += c;
+    return sum;
+  }
+
+ private:
+  static constexpr std::size_t kBatch = 256;  // triangles; 9 KiB in, 10 KiB out: stays in L1
+
+  void append_extra() {
+    size_ = triangle_count_;
+    for (const auto& pieces : extra_) size_ += pieces.size();
+    if (size_ >
+        slots_.size()) {  // happens in a point's first frame only: clipping does not change between frames
+      Buffer<ScreenTriangle<Real>> larger(size_, "the array of screen triangles");
+      std::copy_n(slots_.data(), triangle_count_, larger.data());
+      slots_ = std::move(larger);
+    }
+    ScreenTriangle<Real>* end = slots_.data() + triangle_count_;
+    for (const auto& pieces : extra_) end = std::copy(pieces.begin(), pieces.end(), end);
+  }
+
+  std::size_t triangle_count_;
+  std::size_t batches_;
+  std::size_t size_ = 0;
+  Buffer<ScreenTriangle<Real>> slots_;
+  std::vector<std::vector<ScreenTriangle<Real>>> extra_;  // per batch, so that their order is the ids'
+  std::vector<GeometryCounts> counts_;
+};
+
+/// Renderer for a staged strategy: `Strategy` has
+///   void draw(const StagedTriangles<Mode>&, Visibility<Mode>, Execution&)
+/// and may keep memory between frames; it is made afresh for every point.
+template <NumericMode Mode, class Strategy>
+class FrameRenderer final : public Renderer {
+ public:
+  explicit FrameRenderer(const RendererSetup& setup)
+      : scene_(*setup.scene),
+        settings_(setup.settings),
+        camera_(sized_camera(scene_, settings_)),
+        permutation_seed_(setup.permutation_seed),
+        execution_(make_execution(setup.execution)),
+        screen_(scene_.model.triangles.size()),
+        keys_(settings_.pixels(), "the visibility buffer"),
+        colours_(settings_.pixels(), "the colour buffer"),
+        depths_(settings_.pixels(), "the depth buffer") {}
+
+  const FrameReport& draw() override {
+    const int width = settings_.width;
+    Visibility<Mode> visibility{keys_.span(), width};
+
+    report_.seconds.clear = timed([&] {
+      execution_->uniform_loop(settings_.height, [&](std::int64_t y, int) {
+        std::fill_n(visibility.row(y), width, Mode::kClear);
+      });
+    });
+    report_.seconds.geometry = timed([&] {
+      screen_.transform(scene_.model.triangles, make_screen_transform(camera_), settings_.geometry,
+                        *execution_);
+    });
+    if (permutation_seed_ != 0) screen_.shuffle(permutation_seed_);
+    execution_->reset_tally();
+    report_.seconds.raster = timed([&] {
+      strategy_.draw({screen_.span(), settings_, static_cast<std::int64_t>(scene_.model.triangles.size())},
+                     visibility, *execution_);
+    });
+    report_.raster_tally.assign(execution_->tally().begin(), execution_->tally().end());
+    report_.seconds.resolve = timed([&] {
+      execution_->uniform_loop(settings_.height, [&](std::int64_t y, int) {
+        resolve_row<Mode>(visibility.row(y), width, scene_, settings_.tie, colours_.data() + y * width,
+                          depths_.data() + y * width);
+      });
+    });
+    report_.counts = screen_.counts();
+    return report_;
+  }
+
+  std::span<const std::uint32_t> colours() const override { return colours_.span(); }
+  std::span<const float> depths() const override { return depths_.span(); }
+
+  std::vector<std::int32_t> ids() const override {
+    std::vector<std::int32_t> ids(keys_.size(), -1);
+    const auto count = static_cast<std::int64_t>(scene_.model.triangles.size());
+    for (std::size_t i = 0; i < ids.size(); ++i)
+      if (keys_[i] != Mode::kClear)
+        ids[i] = static_cast<std::int32_t>(swap_rank(settings_.tie, count, Mode::rank(keys_[i])));
+    return ids;
+  }
+
+  std::size_t bytes() const override {
+    return screen_.bytes() +
+           settings_.pixels() * (sizeof(typename Mode::Key) + sizeof(std::uint32_t) + sizeof(float));
+  }
+
+ private:
+  template <class Stage>
+  static double timed(Stage stage) {
+    const auto begin = std::chrono::steady_clock::now();
+    stage();
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  }
+
+  const Scene& scene_;
+  FrameSettings settings_;
+  Camera camera_;
+  std::uint64_t permutation_seed_;
+  std::unique_ptr<Execution> execution_;
+  ScreenTriangles<typename Mode::Real> screen_;
+  Buffer<typename Mode::Key> keys_;
+  Buffer<std::uint32_t> colours_;
+  Buffer<float> depths_;
+  Strategy strategy_;
+  FrameReport report_;
+};
+
+}  // namespace rasterbench

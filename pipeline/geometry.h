@@ -1,0 +1,59 @@
+// The geometry stage: world triangles -> screen triangles. View, near clip, guard-band clip, projection,
+// rejection.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "pipeline/screen.h"
+#include "scene/camera.h"
+#include "scene/model.h"
+
+namespace rasterbench {
+
+/// A camera with its viewport folded in, computed once per frame in double: rows of an affine map from world
+/// points to (x w, y w, z, w), x and y in pixels, and the distance in front of the near plane.
+struct ScreenTransform {
+  AffineRow x, y, z, w, near_distance;
+  double width, height;  ///< of the image in pixels
+};
+ScreenTransform make_screen_transform(const Camera& camera);
+
+/// Choices of the stage.
+struct GeometryOptions {
+  NearRule near_rule = NearRule::kClip;
+  bool cull_back_faces = false;  ///< back faces occlude by default (accuracy.md, section 1)
+};
+
+/// What became of the triangles; the fields before `drawn` count triangles that draw nothing, each once.
+struct GeometryCounts {
+  std::int64_t triangles = 0;
+  std::int64_t non_finite = 0;  ///< a coordinate is NaN or infinite
+  std::int64_t zero_area = 0;   ///< the cross product of two edges is exactly zero in double
+  std::int64_t behind_near =
+      0;  ///< wholly in front of the near plane (or, with NearRule::kOff, a corner at w <= 0)
+  std::int64_t beyond_far = 0;   ///< every corner at d >= 1
+  std::int64_t off_screen = 0;   ///< the box of its corners misses the image
+  std::int64_t back_facing = 0;  ///< counted only when culled
+  std::int64_t drawn = 0;
+  std::int64_t near_clipped = 0;   ///< drawn ones that were cut by the near plane
+  std::int64_t guard_clipped = 0;  ///< drawn ones that were cut by the guard band
+  std::int64_t pieces = 0;         ///< screen triangles made of the drawn ones
+
+  GeometryCounts& operator+=(const GeometryCounts& other);
+};
+
+/// Transforms `triangles`, whose first one has id `first_id`. The first piece of triangle i goes to slots[i]
+/// (a triangle that draws nothing leaves id -1 there); a clipped triangle's further pieces are appended to
+/// `extra` with the same id. All arithmetic is in double; corners are rounded once to Real. Clipping always
+/// interpolates from the inside corner to the outside one, so that neighbours agree, and fans start at the
+/// corner that is smallest in (x, y), so that a flipped duplicate gives the same pieces. Sutherland &
+/// Hodgman, Reentrant polygon clipping, CACM 1974.
+template <class Real>
+void transform_triangles(std::span<const Triangle> triangles, std::int32_t first_id,
+                         const ScreenTransform& transform, const GeometryOptions& options,
+                         ScreenTriangle<Real>* slots, std::vector<ScreenTriangle<Real>>& extra,
+                         GeometryCounts& counts);
+
+}  // namespace rasterbench
