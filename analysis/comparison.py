@@ -43,6 +43,17 @@ class Group:
         return slug(self.title)
 
 
+@dataclass(frozen=True)
+class Panel:
+    """The schedules and chunks of one kernel on one thread count."""
+
+    group: Group
+    kernel: str
+    threads: int
+    cells: dict[tuple[str, int | None], Record]
+    comparisons: dict[str, Comparison]
+
+
 def slug(title: str) -> str:
     """A title as a file name."""
     words = "".join(c.lower() if c.isalnum() and c.isascii() else " " for c in title).split()
@@ -124,19 +135,20 @@ class Analysis:
         names = {key[0] for key in found}
         if len({key[:2] for key in found}) == len(names) and "scene_hash" in varying:
             varying.remove("scene_hash")
+        families = sum(any(record.ok for record in records) for records in found.values())
         groups = []
         for key, records in found.items():
             config = records[0].config
             title = f"{config.scene} {config.size[0]}x{config.size[1]} {config.numeric}"
             said = {"scene", "size", "numeric"}
             title += "".join(f" {getattr(config, axis)}" for axis in varying if axis not in said)
-            groups.append(self._compared(Group(key, title, records)))
+            groups.append(self._compared(Group(key, title, records), families))
         return groups
 
-    def _compared(self, group: Group) -> Group:
+    def _compared(self, group: Group, families: int) -> Group:
         timed = group.timed
         if timed:
-            best, comparisons = statistics.compare_with_best([r.samples for r in timed], self.study.target)
+            best, comparisons = statistics.compare_with_best([r.samples for r in timed], self.study.target, families)
             group.best = timed[best]
             group.comparisons = {record.id: c for record, c in zip(timed, comparisons)}
         return group
@@ -178,6 +190,29 @@ class Analysis:
         if key not in self._ratios:
             self._ratios[key] = statistics.ratio(base.samples, record.samples)
         return self._ratios[key]
+
+    @cached_property
+    def panels(self) -> list[Panel]:
+        """Schedule x chunk of every kernel at the highest thread count of its group, each compared within itself."""
+        found: list[tuple[Group, str, int, dict[tuple[str, int | None], Record]]] = []
+        for group in self.groups:
+            parallel = [r for r in group.records if r.config.backend != "serial" and r.config.schedule is not None]
+            threads = max((r.config.threads for r in parallel if r.ok), default=0)
+            for kernel in group.kernels:
+                cells = {(self._without_chunk(r), r.config.chunk): r for r in parallel
+                         if r.config.kernel == kernel and r.config.threads == threads}
+                if sum(r.ok for r in cells.values()) > 1:
+                    found.append((group, kernel, threads, cells))
+        panels = []
+        for group, kernel, threads, cells in found:
+            timed = [r for r in cells.values() if r.ok]
+            _, comparisons = statistics.compare_with_best([r.samples for r in timed], self.study.target, len(found))
+            panels.append(Panel(group, kernel, threads, cells, {r.id: c for r, c in zip(timed, comparisons)}))
+        return panels
+
+    def _without_chunk(self, record: Record) -> str:
+        name = self.execution(record)
+        return name if record.config.chunk is None else name.replace(f",{record.config.chunk}", "", 1)
 
     # shared selections
 

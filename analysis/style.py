@@ -17,6 +17,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 FULL_WIDTH = 6.9  # inches: the text width of an A4 page
 MAX_HEIGHT = 9.0  # with its caption it still fits on that page
 PNG_DPI = 150
+HEADROOM = 1.08  # a linear axis ends this much beyond its largest value
 
 # Okabe and Ito's palette without yellow (too light for a thin line on white), the darkest contrasts first.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#7F7F7F")
@@ -93,7 +94,7 @@ def number_axis(axes: Axes, low: float, high: float, log: bool, name: str = "x")
         axis.set_minor_locator(NullLocator())
         axis.set_minor_formatter(NullFormatter())
     else:
-        limits(0, high * 1.08)
+        limits(0, high * HEADROOM)
         axis.set_major_locator(MaxNLocator(6))
     axis.set_major_formatter(FuncFormatter(plain))
 

@@ -2,6 +2,7 @@
 
 #include <dlfcn.h>
 #include <fmt/format.h>
+#include <omp.h>
 #include <sched.h>
 
 #include <algorithm>
@@ -82,6 +83,11 @@ std::vector<std::string> backends() {
   return names;
 }
 
+bool is_left_out(const std::string& backend) {
+  const std::vector<std::string> built = backends();
+  return backend == "tbb" && std::find(built.begin(), built.end(), backend) == built.end();
+}
+
 const Schedule& find_schedule(const ExecutionConfig& config) {
   const std::vector<std::string> known_backends = backends();
   if (std::find(known_backends.begin(), known_backends.end(), config.backend) == known_backends.end())
@@ -116,16 +122,12 @@ std::unique_ptr<Execution> make_execution(const ExecutionConfig& config) {
 ScheduleRegistration::ScheduleRegistration(Schedule schedule) { registry().push_back(std::move(schedule)); }
 
 int available_cpus() {
-  // OMP_PROC_BIND narrows the mask of the main thread once the OpenMP runtime is up: read it once, before
+  // OMP_PROC_BIND narrows the mask of the main thread to one CPU; the OpenMP runtime counted before it did
   // that.
-  static const int count = [] {
-    cpu_set_t mask;
-    CPU_ZERO(&mask);
-    if (sched_getaffinity(0, sizeof mask, &mask) != 0)
-      return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-    return CPU_COUNT(&mask);
-  }();
-  return count;
+  cpu_set_t mask;
+  CPU_ZERO(&mask);
+  const int allowed = sched_getaffinity(0, sizeof mask, &mask) == 0 ? CPU_COUNT(&mask) : 1;
+  return std::max(allowed, omp_get_num_procs());
 }
 
 std::string openmp_runtime() {

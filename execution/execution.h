@@ -87,8 +87,12 @@ struct Schedule {
 /// Every schedule of this build, in the order of registration.
 std::span<const Schedule> schedules();
 
-/// Names of the backends of this build, and those left out of it with the reason.
+/// Names of the backends of this build.
 std::vector<std::string> backends();
+
+/// Backends that a build can be made without (oneTBB was not found): asking for one is a visible skip, not an
+/// error.
+bool is_left_out(const std::string& backend);
 
 /// Throws InputError (with a did-you-mean) unless this build can run `config`.
 const Schedule& find_schedule(const ExecutionConfig& config);
@@ -100,7 +104,7 @@ struct ScheduleRegistration {
   explicit ScheduleRegistration(Schedule schedule);
 };
 
-/// CPUs that this process may run on (its affinity mask when it started).
+/// CPUs that this process may run on (its affinity mask when it started, before any binding of threads).
 int available_cpus();
 
 /// Name and version of the OpenMP runtime that is loaded, e.g. "libgomp" or "libomp".

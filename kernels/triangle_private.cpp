@@ -23,9 +23,12 @@ struct TrianglePrivate {
     void draw(const StagedTriangles<Mode>& in, Visibility<Mode> out, Execution& execution) {
       const auto width = static_cast<std::size_t>(out.width);
       const std::size_t height = out.keys.size() / width;
-      if (layers_.empty())
+      if (layers_.empty()) {
+        const auto threads = static_cast<std::size_t>(execution.threads());
+        checked_bytes(out.keys.size() * threads, sizeof(Key), "a visibility buffer per thread");
         for (int worker = 0; worker < execution.threads(); ++worker)
           layers_.emplace_back(out.keys.size(), height);
+      }
       for (Layer& layer : layers_) layer.next_frame();
 
       execution.loop(in.size(), [&](std::int64_t i, int worker) {

@@ -85,7 +85,7 @@ class FrameRenderer final : public Renderer {
  public:
   explicit FrameRenderer(const RendererSetup& setup)
       : scene_(*setup.scene),
-        settings_(setup.settings),
+        settings_(checked(setup.settings)),
         camera_(sized_camera(scene_, settings_)),
         permutation_seed_(setup.permutation_seed),
         execution_(make_execution(setup.execution)),
@@ -142,6 +142,14 @@ class FrameRenderer final : public Renderer {
   }
 
  private:
+  /// Refuses an image whose buffers, together with a copy for its ids and its file, exceed the memory at
+  /// hand: pages are taken when they are touched, so that each buffer alone would seem to fit.
+  static const FrameSettings& checked(const FrameSettings& settings) {
+    checked_bytes(settings.pixels(), sizeof(typename Mode::Key) + 2 * (sizeof(std::uint32_t) + sizeof(float)),
+                  "an image of " + std::to_string(settings.width) + "x" + std::to_string(settings.height));
+    return settings;
+  }
+
   template <class Stage>
   static double timed(Stage stage) {
     const auto begin = std::chrono::steady_clock::now();

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "numeric/bound.h"
 #include "pipeline/screen.h"
 #include "scene/camera.h"
 #include "scene/model.h"
@@ -28,16 +29,6 @@ struct IdImage {
 /// height <= kMaxImageSide.
 IdImage render_in_double(std::span<const Triangle> triangles, const Camera& camera, FillRule fill,
                          NearRule near_rule);
-
-/// How far a numeric mode may stray from exact arithmetic, before any input is known. Its geometry is in
-/// double.
-struct ModeBound {
-  double vertex_unit;  ///< unit roundoff of the stored screen vertices: 2^-24 or 2^-53
-  double snap;         ///< largest snap of a coordinate in pixels: 2^-9 for fixed_8, else 0
-  double
-      edge_unit;  ///< unit roundoff of the edge functions (b-a)x(p-a): 2^-24, 2^-53, or 0 if exact integers
-  double depth_unit;  ///< unit roundoff of the depth interpolation d0 + gy dy + gx dx
-};
 
 /// How a picture differs from the double renderer's. Every pixel is in exactly one of the classes identical
 /// (unless its depth is out of bound), edge_ties, depth_ties and errors.

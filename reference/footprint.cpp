@@ -31,9 +31,11 @@ constexpr double kGeometry = gamma(64, kDoubleUnit);
 // An edge function: two differences and a product in each term, and their difference. Twice that, because the
 // bound is taken at the exact vertices instead of the rounded ones.
 constexpr int kEdgeRoundings = 8;
-// A depth: differences, products, their difference, the division by the area (or a reciprocal and a product),
-// and the three terms of the plane.
-constexpr int kDepthRoundings = 12;
+// A numerator or the area of a gradient: two differences and a product in each term, and their difference;
+// and the division, or a reciprocal and a product.
+constexpr int kGradientRoundings = 6;
+// The plane at a point: a difference, a product and two sums.
+constexpr int kPlaneRoundings = 5;
 
 // A computed value and the size of what it was summed from: its error is at most kGeometry * size.
 struct Sum {
@@ -83,8 +85,9 @@ std::vector<Weights> clipped(const std::vector<Weights>& polygon, const std::arr
     const double fa = at(a), fb = at(b);
     if (fa >= 0) result.push_back(a);
     if ((fa >= 0) == (fb >= 0)) continue;
-    const double t = fa / (fa - fb);
-    result.push_back({a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])});
+    // Both shares from the values, rather than one as 1 - the other: it may be tiny and matter all the same.
+    const double s = fb / (fb - fa), t = fa / (fa - fb);
+    result.push_back({s * a[0] + t * b[0], s * a[1] + t * b[1], s * a[2] + t * b[2]});
   }
   return result;
 }
@@ -137,16 +140,18 @@ void finish(Polygon& polygon, const ModeBound& bound) {
     for (std::size_t k = 0; k < v.size(); ++k) {
       if (k == i || k == polygon.next(i)) continue;
       const EdgeView view = view_of(polygon, i, v[k].x, v[k].y);
-      const double error = view.error + 2 * v[k].reach + gamma(kEdgeRoundings, bound.edge_unit) * view.start;
+      // The kernel computes the area from any two sides, which may be longer than this one.
+      const double area_error = gamma(kEdgeRoundings, bound.edge_unit) * view.start * polygon.perimeter;
+      const double error = view.error + 2 * v[k].reach + area_error / view.length;
       if (!(-view.outside > error)) polygon.firm[i] = false;
     }
   }
 }
 
-// Whether the kernel may find (x, y) covered. It only does so inside the bounding box of its vertices and,
-// but for the error of its edge functions, inside their convex hull, which lies within `reach` of the
-// polygon. Along a firm edge the hull ends at the moved edge itself. Where an edge is not firm, the kernel
-// may see the triangle reversed, and a point is accepted that the errors of all edges together (hence
+// Whether the kernel may find (x, y) covered by a piece. It only does so inside the bounding box of its
+// vertices and, but for the error of its edge functions, inside their convex hull, which lies within `reach`
+// of the polygon. Along a firm edge the hull ends at the moved edge itself. Where an edge is not firm, the
+// kernel may see the triangle reversed, and a point is accepted that the errors of all edges together (hence
 // perimeter / length) hide from this one.
 bool may_be_inside(const Polygon& polygon, double x, double y, const ModeBound& bound) {
   if (polygon.vertices.size() < 3) return false;
@@ -187,8 +192,9 @@ bool must_be_inside(const Polygon& polygon, double x, double y, const ModeBound&
 // area itself, only the clamp bounds the depth.
 DepthRange depth_on_piece(const Polygon& piece, double x, double y, const ModeBound& bound) {
   const auto& v = piece.vertices;
-  const double unit =
-      gamma(kDepthRoundings, bound.depth_unit + kDoubleUnit);  // the kernel's, and this function's
+  // The kernel's roundings, and this function's.
+  const double gradient_error = gamma(kGradientRoundings, bound.depth_unit + kDoubleUnit);
+  const double plane_error = gamma(kPlaneRoundings, bound.depth_unit + kDoubleUnit);
   const double slack = std::max({v[0].slack, v[1].slack, v[2].slack});
   const auto [d_min, d_max] = std::minmax({v[0].d, v[1].d, v[2].d});
   const double output = kOutputUnit * std::max({1.0, std::abs(d_min), std::abs(d_max)});
@@ -202,18 +208,18 @@ DepthRange depth_on_piece(const Polygon& piece, double x, double y, const ModeBo
     const double ax2 = std::abs(x2), ay2 = std::abs(y2), ad2 = std::abs(d2);
     const double area = x1 * y2 - x2 * y1, gx = (d1 * y2 - d2 * y1) / area, gy = (d2 * x1 - d1 * x2) / area;
     const double products = (ax1 + dr) * (ay2 + dr) + (ax2 + dr) * (ay1 + dr);
-    const double least = std::abs(area) - dr * (ax1 + ay1 + ax2 + ay2 + 2 * dr) - unit * products;
+    const double least = std::abs(area) - dr * (ax1 + ay1 + ax2 + ay2 + 2 * dr) - gradient_error * products;
     if (!(least > 0.5 * std::abs(area))) return {d_min - room, d_max + room};
     // A numerator: the size of its products, the largest quotient, and the error of the quotient.
     const double x_products = (ad1 + ds) * (ay2 + dr) + (ad2 + ds) * (ay1 + dr);
     const double y_products = (ad1 + ds) * (ax2 + dr) + (ad2 + ds) * (ax1 + dr);
     const double gx_most = (std::abs(gx * area) + dr * (ad1 + ad2) + ds * (ay1 + ay2 + 2 * dr)) / least;
     const double gy_most = (std::abs(gy * area) + dr * (ad1 + ad2) + ds * (ax1 + ax2 + 2 * dr)) / least;
-    const double gx_error = unit * (x_products + gx_most * products) / least;
-    const double gy_error = unit * (y_products + gy_most * products) / least;
+    const double gx_error = gradient_error * (x_products + gx_most * products) / least;
+    const double gy_error = gradient_error * (y_products + gy_most * products) / least;
     const double dx = std::abs(x - a.x) + piece.reach, dy = std::abs(y - a.y) + piece.reach;
     rounding = std::max(rounding, gx_error * dx + gy_error * dy +
-                                      unit * (std::abs(a.d) + slack + gx_most * dx + gy_most * dy));
+                                      plane_error * (std::abs(a.d) + slack + gx_most * dx + gy_most * dy));
     movement = std::hypot(gx, gy) * (piece.reach + gamma(kEdgeRoundings, bound.edge_unit) * piece.perimeter);
     depth = a.d + gy * (y - a.y) + gx * (x - a.x);
   }
@@ -288,9 +294,9 @@ Footprint::Footprint(const Triangle& t, std::int32_t id, const Camera& camera, N
       if (p.w.value <= kGeometry * p.w.size) may_vanish_ = true;
     }
   }
-  largest_ = visible_part(corners, 1, near_rule, bound);
   smallest_ = visible_part(corners, -1, near_rule, bound);
-  const auto& v = largest_.vertices;
+  const Polygon largest = visible_part(corners, 1, near_rule, bound);
+  const auto& v = largest.vertices;
   for (std::size_t i = 0; i < v.size(); ++i)
     for (std::size_t j = i + 1; j < v.size(); ++j)
       for (std::size_t k = j + 1; k < v.size(); ++k) {
@@ -301,16 +307,24 @@ Footprint::Footprint(const Triangle& t, std::int32_t id, const Camera& camera, N
       }
 }
 
-bool Footprint::may_cover(double x, double y) const { return may_be_inside(largest_, x, y, bound_); }
+bool Footprint::may_cover(double x, double y) const {
+  return std::any_of(pieces_.begin(), pieces_.end(),
+                     [&](const Polygon& piece) { return may_be_inside(piece, x, y, bound_); });
+}
 
 bool Footprint::must_cover(double x, double y) const {
-  return !may_vanish_ && must_be_inside(smallest_, x, y, bound_);
+  if (may_vanish_ || !must_be_inside(smallest_, x, y, bound_)) return false;
+  if (pieces_.size() == 1) return true;
+  // A piece so thin that the kernel may see it reversed may be missing.
+  return std::none_of(pieces_.begin(), pieces_.end(), [&](const Polygon& piece) {
+    return !piece.firm[0] && !piece.firm[1] && !piece.firm[2] && may_be_inside(piece, x, y, bound_);
+  });
 }
 
 DepthRange Footprint::depths(double x, double y) const {
-  if (!largest_.is_bounded) return {-INFINITY, INFINITY};
   DepthRange here{INFINITY, -INFINITY}, anywhere = here;
   for (const Polygon& piece : pieces_) {
+    if (!piece.is_bounded) return {-INFINITY, INFINITY};
     const DepthRange part = depth_on_piece(piece, x, y, bound_);
     anywhere = {std::min(anywhere.low, part.low), std::max(anywhere.high, part.high)};
     if (pieces_.size() > 1 && !may_be_inside(piece, x, y, bound_)) continue;

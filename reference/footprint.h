@@ -54,9 +54,11 @@ class Footprint {
  private:
   std::int32_t id_ = -1;
   ModeBound bound_{};
-  bool may_vanish_ = false;      // its world area or, without a near plane, its w is zero but for rounding
-  Polygon largest_, smallest_;   // with the near plane as near and as far as errors can bring it
-  std::vector<Polygon> pieces_;  // all triangles of vertices of largest_: any fan is made of these
+  bool may_vanish_ = false;  // its world area or, without a near plane, its w is zero but for rounding
+  Polygon smallest_;         // with the near plane as far away as errors can bring it
+  // With the near plane as near as errors can bring it, all triangles of the polygon's vertices: any fan that
+  // a kernel cuts it into is made of these.
+  std::vector<Polygon> pieces_;
 };
 
 }  // namespace rasterbench::reference

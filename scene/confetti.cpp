@@ -1,17 +1,18 @@
-// confetti: equilateral triangles at random places, in random orientations, all inside the picture: the load is
-// even over the picture and, with distribution=heavy, very uneven over the triangles: what schedules differ in.
+// confetti: equilateral triangles at random places, in random orientations, all inside the picture: the load
+// is even over the picture and, with distribution=heavy, very uneven over the triangles: what schedules
+// differ in.
 //
-// Size: a triangle of s pixels that faces the camera has edges of s pixels in a picture of 1080 lines (s H/1080
-// in one of H lines), whatever its distance; then it is turned at random, which halves its area on average: about
-// 0.22 s^2 pixels are covered.
+// Size: a triangle of s pixels that faces the camera has edges of s pixels in a picture of 1080 lines (s
+// H/1080 in one of H lines), whatever its distance; then it is turned at random, which halves its area on
+// average: about 0.22 s^2 pixels are covered.
 //   uniform  s uniform in [0.5, 1.5] * size
 //   heavy    s from a Pareto distribution with alpha = 16/13 = 1.23 without its largest 1/256: mean `size`,
-//            smallest 0.29 size, largest 26 size (at most 800 pixels: above size = 30 the mean is therefore lower).
-//            0.7 % of the triangles then have half of the area.
+//            smallest 0.29 size, largest 26 size (at most 800 pixels: above size = 30 the mean is therefore
+//            lower). 0.7 % of the triangles then have half of the area.
 // A triangle is wholly in the picture, so the large ones keep away from its border.
 //
-// Only + - * / and sqrt are used, so that the bytes are the same everywhere: 1/alpha = 1/2 + 1/4 + 1/16 makes the
-// power a chain of square roots, and orientations come from points in a ball, not from angles.
+// Only + - * / and sqrt are used, so that the bytes are the same everywhere: 1/alpha = 1/2 + 1/4 + 1/16 makes
+// the power a chain of square roots, and orientations come from points in a ball, not from angles.
 
 #include <algorithm>
 #include <cmath>

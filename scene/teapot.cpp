@@ -78,11 +78,13 @@ struct Bounds {
   }
 };
 
-bool equal(const Vec3& a, const Vec3& b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
-
-/// Leaves out what has no area: at a pole a whole row of the grid is one point.
+/// Leaves out what has no area: at a pole a whole row of the grid is one point, and with n = 1 the tip of the
+/// spout is a line.
 void add_triangle(std::vector<Triangle>& triangles, const Vec3& a, const Vec3& b, const Vec3& c) {
-  if (!equal(a, b) && !equal(b, c) && !equal(c, a)) triangles.push_back({a, b, c});
+  const Vec3d u{double{b.x} - a.x, double{b.y} - a.y, double{b.z} - a.z};
+  const Vec3d v{double{c.x} - a.x, double{c.y} - a.y, double{c.z} - a.z};
+  if (u.y * v.z != u.z * v.y || u.z * v.x != u.x * v.z || u.x * v.y != u.y * v.x)
+    triangles.push_back({a, b, c});
 }
 
 Scene make_teapot(const GeneratorValues& values) {

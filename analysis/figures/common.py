@@ -156,7 +156,7 @@ def _points(axes, row: Row, y: float, series: int) -> None:
     for point in row.points:
         look = style.look(point.series)
         # Points of one row are set apart a little: at equal times all of them stay visible.
-        at = y + (point.series - (series - 1) / 2) * min(0.2, 0.6 / max(1, series))
+        at = y + (point.series - (series - 1) / 2) * min(0.14, 0.6 / max(1, series))
         if point.low is not None:
             axes.plot([point.low, point.high], [at, at], color=look.colour, lw=1.4, solid_capstyle="butt", zorder=3)
             axes.plot([point.low, point.high], [at, at], color=look.colour, lw=0, marker="|", ms=5, mew=1.0, zorder=3)

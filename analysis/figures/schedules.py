@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Iterator
 
 from matplotlib.axes import Axes
@@ -10,10 +9,8 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, LogNorm
 from matplotlib.patches import Patch, Rectangle
 
-from .. import captions, statistics, style, text
-from ..comparison import Analysis, Group
-from ..load import Record
-from ..statistics import Comparison
+from .. import captions, style, text
+from ..comparison import Analysis, Group, Panel
 from .common import Drawing, named, part
 
 SECTION = "Schedules and chunks"
@@ -24,40 +21,11 @@ DARKEST = 4.0  # slower than four times the best needs no further shades
 SHADES = LinearSegmentedColormap.from_list("slower", ["#FFFFFF", "#BBD7EA", "#5E9DC8", "#0F4F82", "#06284A"])
 
 
-@dataclass(frozen=True)
-class Panel:
-    kernel: str
-    cells: dict[tuple[str, int | None], Record]
-    comparisons: dict[str, Comparison]
-
-
 def draw(analysis: Analysis) -> Iterator[Drawing]:
     for group in analysis.groups:
-        panels, threads = heat_panels(analysis, group)
+        panels = [panel for panel in analysis.panels if panel.group is group]
         if panels:
-            yield from _draw(analysis, group, panels, threads)
-
-
-def row_name(analysis: Analysis, record: Record) -> str:
-    """The execution without its chunk, which has a column of its own."""
-    name = analysis.execution(record)
-    return name if record.config.chunk is None else name.replace(f",{record.config.chunk}", "", 1)
-
-
-def heat_panels(analysis: Analysis, group: Group) -> tuple[list[Panel], int]:
-    """The kernels with at least two schedules or chunks, each compared within itself."""
-    parallel = [r for r in group.records if r.config.backend != "serial" and r.config.schedule is not None]
-    threads = max((r.config.threads for r in parallel if r.ok), default=0)
-    panels = []
-    for kernel in group.kernels:
-        records = [r for r in parallel if r.config.kernel == kernel and r.config.threads == threads]
-        cells = {(row_name(analysis, r), r.config.chunk): r for r in records}
-        timed = [r for r in cells.values() if r.ok]
-        if len(timed) < 2:
-            continue
-        _, comparisons = statistics.compare_with_best([r.samples for r in timed], analysis.study.target)
-        panels.append(Panel(kernel, cells, {r.id: c for r, c in zip(timed, comparisons)}))
-    return panels, threads
+            yield from _draw(analysis, group, panels, panels[0].threads)
 
 
 def _draw(analysis: Analysis, group: Group, panels: list[Panel], threads: int) -> Iterator[Drawing]:
@@ -75,7 +43,7 @@ def _draw(analysis: Analysis, group: Group, panels: list[Panel], threads: int) -
             shown, estimates=None,
             notes=[f"Cells are median times of a frame in ms ({analysis.sampled(shown)}); 'default' leaves the chunk to the"
                    " runtime. The thick frame is the fastest cell of a panel, thin frames cannot be told apart from it (rank"
-                   " test with Holm correction within the panel, and paired interval). Other thread counts are in the"
+                   f" test, Holm-corrected within the panel and for all {len(analysis.panels)} panels, and paired interval). Other thread counts are in the"
                    " table of all points."])
         yield Drawing(named(f"schedules_{group.slug}", page, len(split)), SECTION, figure, caption)
 

@@ -56,7 +56,7 @@ def _draw(analysis: Analysis, group: Group) -> Iterator[Drawing]:
             label = analysis.execution(record)
             label += "" if record.config.backend == "serial" else f", {analysis.threads(record)}"
             by_label[(kernel, label)] = record
-            beyond = _total(analysis, record) > limit
+            beyond = _total(analysis, record) > limit * style.HEADROOM
             rows.append(Row(label, note=f"\u25b6 {text.number(analysis.estimates[record.id].value)}" if beyond else ""))
         if rows:
             blocks.append(Block(kernel, rows))
@@ -75,7 +75,7 @@ def _draw(analysis: Analysis, group: Group) -> Iterator[Drawing]:
         if not complete:
             notes.append("Of each kernel, backend and thread count only the fastest execution is drawn; tables/stages.csv"
                          " has all.")
-        if limit < totals[-1]:
+        if totals[-1] > limit * style.HEADROOM:
             notes.append("Bars that leave the axis end in an arrow and their time in ms.")
         caption = captions.build(analysis, f"Stages of a frame, {group.title}{part(page, len(split))}",
                                  "Long parts are where time can be won; a part that does not shrink with more threads"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Iterator
 
-from .. import captions
+from .. import captions, text
 from ..comparison import Analysis, Group
 from ..load import Record
 from ..statistics import Estimate
@@ -46,7 +46,7 @@ def _draw(analysis: Analysis, group: Group) -> Iterator[Drawing]:
         # All pages of a scene share one axis, so that they can be laid side by side.
         figure = dots(chosen, [f"{n} thread{'s' if n > 1 else ''}" for n in threads], group.title + part(page, len(split)),
                       "time of a frame, median (ms)" + (", log scale" if log else ""), limits=bounds(every), log=log,
-                      ring="fastest, and not distinguishable from it")
+                      ring="fastest, or not distinguishable from it")
         caption = captions.build(
             analysis, f"Time per strategy, {group.title}{part(page, len(split))}",
             "Left is faster. Where two intervals are apart the points differ; rings mark the fastest and what cannot be told"
@@ -61,8 +61,10 @@ def near_best(group: Group, record: Record) -> bool:
 def _notes(analysis: Analysis, group: Group) -> list[str]:
     notes = ["An interval that is narrower than its marker is hidden by it."]
     if len(group.timed) > 1:
-        notes.append("Told apart means: rank test with Holm correction over "
-                     f"{len(group.timed) - 1} comparisons below 0.05, and the paired interval of the ratio above 1.")
+        scenes = len([g for g in analysis.groups if g.timed])
+        notes.append(f"Told apart means: rank test, corrected for {text.count(len(group.timed) - 1, 'comparison')} (Holm)"
+                     + (f" on each of {scenes} scenes" if scenes > 1 else "")
+                     + ", below 0.05, and the paired interval of the ratio above 1.")
     if group.untimed:
         notes.append("Failed and skipped points are listed with their reasons and show no time.")
     return notes

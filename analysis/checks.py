@@ -1,0 +1,199 @@
+"""The rules of measuring that these data break, each said in the report."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Iterator
+
+from . import statistics, text
+from .comparison import Analysis
+from .load import Record
+
+NOT_PUBLISHABLE = "not publishable"
+NOTE = "note"
+NEEDED = {"program": ("commit", "compiler", "flags"), "machine": ("cpu", "cpus_allowed", "caches", "governor", "smt", "numa_nodes")}
+
+
+@dataclass(frozen=True)
+class Warn:
+    severity: str
+    text: str
+
+
+def check(analysis: Analysis) -> list[Warn]:
+    """The grave ones first."""
+    found = [warn for rule in (_launches, _samples, _stops, _provenance, _load, _bases, _pinning, _threads, _families,
+                               _agreement, _images) for warn in rule(analysis)]
+    return sorted(found, key=lambda warn: warn.severity != NOT_PUBLISHABLE)
+
+
+def _some(records: list[Record], analysis: Analysis) -> str:
+    return f"{len(records)} of {text.count(len(analysis.study.timed), 'timed point')}"
+
+
+def _launches(analysis: Analysis) -> Iterator[Warn]:
+    counts = {record.samples.launch_count for record in analysis.study.timed}
+    if counts and min(counts) < statistics.MIN_LAUNCHES:
+        many = "one launch" if max(counts) == 1 else text.count(min(counts), "launch", "launches")
+        many += " for some points" if len(counts) > 1 else ""
+        yield Warn(NOT_PUBLISHABLE, f"{many}: published results need at least {statistics.MIN_LAUNCHES}, because one process has one"
+                   " memory layout; the intervals here do not cover what another launch would change.")
+
+
+def _samples(analysis: Analysis) -> Iterator[Warn]:
+    few = [r for r in analysis.study.timed if r.samples.n < statistics.MIN_SAMPLES]
+    if few:
+        yield Warn(NOT_PUBLISHABLE, f"fewer than {statistics.MIN_SAMPLES} samples for {_some(few, analysis)}: they have no interval and"
+                   " nothing is claimed of them.")
+
+
+def _stops(analysis: Analysis) -> Iterator[Warn]:
+    for stop in ("time_limit", "point_seconds", "max_samples"):
+        stopped = [r for r in analysis.study.timed if r.stop == stop]
+        if stopped:
+            widths = [(e.high - e.low) / e.value / 2 for r in stopped if (e := analysis.estimates[r.id]).has_interval]
+            wide = f"; the widest interval is ±{text.percent(max(widths))} of its median" if widths else ""
+            why = {"time_limit": "the time limit of the study", "point_seconds": "the time limit of a point",
+                   "max_samples": "the largest number of samples"}[stop]
+            yield Warn(NOTE, f"{_some(stopped, analysis)} stopped by {why}, not because the interval was within the target{wide}.")
+    unsaid = [r for r in analysis.study.timed if not r.stop]
+    if unsaid:
+        yield Warn(NOTE, f"no stop reason recorded for {_some(unsaid, analysis)}.")
+
+
+def _provenance(analysis: Analysis) -> Iterator[Warn]:
+    context = analysis.study.context
+    if context["program"].get("dirty") is not False:
+        yield Warn(NOT_PUBLISHABLE, "the program was built from a dirty commit: its source cannot be had again from the commit."
+                   if context["program"].get("dirty") else "the record does not say whether the commit was dirty.")
+    silent = [f"{part}.{key}" for part, keys in NEEDED.items() for key in keys if context[part].get(key) in (None, "")]
+    if silent:
+        yield Warn(NOT_PUBLISHABLE, f"the context says nothing of {text.listing(silent, 8)}.")
+    missing = [f"{path} ({value.split(':', 1)[1].strip() if ':' in value else 'no reason'})" for path, value in _leaves(context)
+               if isinstance(value, str) and value.startswith("unavailable")]
+    if missing:
+        yield Warn(NOTE, f"not available on this machine: {text.listing(missing, 6)}.")
+
+
+def _leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    if isinstance(value, dict):
+        for key, item in value.items():
+            yield from _leaves(item, f"{path}.{key}" if path else str(key))
+    else:
+        yield path, value
+
+
+def first_load(value: Any) -> float | None:
+    """The one-minute load average, from a number, a list or the text of /proc/loadavg."""
+    if isinstance(value, (list, tuple)) and value:
+        value = value[0]
+    if isinstance(value, str):
+        value = value.split()[0].rstrip(",") if value.split() else None
+    try:
+        load = float(value)
+    except (TypeError, ValueError):
+        return None
+    return load if math.isfinite(load) else None
+
+
+def _load(analysis: Analysis) -> Iterator[Warn]:
+    machine = analysis.study.context["machine"]
+    load = first_load(machine.get("load_average"))
+    cpus = machine.get("cpus_online")
+    cpus = cpus if isinstance(cpus, int) and cpus > 0 else 1
+    if load is not None and load > 0.25 * cpus:
+        yield Warn(NOTE, f"load average {load:g} on {text.count(cpus, 'CPU')} at the start: something else was running.")
+
+
+def _bases(analysis: Analysis) -> Iterator[Warn]:
+    timed = analysis.study.timed
+    parallel = [r for r in timed if r.config.backend != "serial"]
+    no_serial = [r for r in parallel if analysis.serial_base[r.id] is None]
+    no_thread = [r for r in parallel if analysis.thread_base[r.id] is None]
+    if no_serial:
+        yield Warn(NOTE, f"no base (a), a serial kernel with equal picture, numeric mode and instruction set, for"
+                   f" {_some(no_serial, analysis)}.")
+    if no_thread:
+        yield Warn(NOTE, f"no base (b), the same point on one thread, for {_some(no_thread, analysis)}: they show no efficiency.")
+    notes: dict[str, int] = {}
+    for record in timed:
+        for base in (analysis.serial_base[record.id], analysis.thread_base[record.id]):
+            speedup = analysis.speedup(record, base)
+            if speedup is not None and speedup.note:
+                notes[speedup.note] = notes.get(speedup.note, 0) + 1
+    for note, many in notes.items():
+        yield Warn(NOTE, f"{text.count(many, 'speedup')} with a caveat: {note}.")
+
+
+def _pinning(analysis: Analysis) -> Iterator[Warn]:
+    loose = [r for r in analysis.study.timed if r.config.threads > 1
+             and str(r.config.binding or "none").lower() in ("none", "false", "off")]
+    if loose:
+        yield Warn(NOTE, f"threads were not pinned for {_some(loose, analysis)}: the scheduler may have moved them.")
+
+
+def _threads(analysis: Analysis) -> Iterator[Warn]:
+    fewer = [r for r in analysis.study.timed if r.threads_observed is not None and r.threads_observed < r.config.threads]
+    if fewer:
+        yield Warn(NOT_PUBLISHABLE, f"fewer threads ran than were asked for in {_some(fewer, analysis)}.")
+    allowed = analysis.study.context["machine"].get("cpus_allowed")
+    if isinstance(allowed, list) and allowed:
+        over = [r for r in analysis.study.timed if r.config.threads > len(allowed)]
+        if over:
+            yield Warn(NOTE, f"more threads than the {text.count(len(allowed), 'allowed CPU')} in {_some(over, analysis)}.")
+
+
+def _families(analysis: Analysis) -> Iterator[Warn]:
+    """Many comparisons with few samples: no rank test can be significant after the correction, whatever the times."""
+    for group in analysis.groups:
+        assumed = [c for c in group.comparisons.values() if c.test == statistics.WELCH]
+        if assumed:
+            yield Warn(NOTE, f"{group.title}: for {len(assumed)} of {text.count(len(group.timed) - 1, 'comparison')} with the fastest the"
+                       " samples are too few for a rank test after correction; Welch's t test on logarithms stands in, which"
+                       " assumes a distribution.")
+
+
+def _agreement(analysis: Analysis) -> Iterator[Warn]:
+    study = analysis.study
+    counts = study.context["points"]
+    run = len([r for r in study.records if r.raw.get("status") == "ok"])
+    planned = counts.get("planned")
+    if isinstance(planned, int) and planned != len(study.records):
+        yield Warn(NOT_PUBLISHABLE, f"the context plans {planned} points, the records hold {len(study.records)}.")
+    elif isinstance(counts.get("run"), int) and counts["run"] not in (run, len(study.records)):
+        yield Warn(NOTE, f"the context counts {counts['run']} points as run, the records {run}.")
+    own = study.context.get("id")
+    strangers = [r for r in study.records if own and r.context not in (None, own)]
+    if strangers:
+        yield Warn(NOT_PUBLISHABLE, f"{text.count(len(strangers), 'record')} of another context than context.json: their machine or build"
+                   " may differ.")
+    contradicted = [r for r in study.records if r.raw.get("status") == "ok" and not r.ok]
+    if contradicted:
+        yield Warn(NOT_PUBLISHABLE, f"{text.count(len(contradicted), 'record')} with status ok but without a verdict that it conforms:"
+                   " shown as failed.")
+    off = []
+    for record in study.timed:
+        bounds = statistics.order_interval(record.samples.values)
+        stored = record.recorded_interval
+        if (bounds is None) != (stored is None) or (bounds and not all(map(_close, bounds, stored))) or (
+                record.recorded_median is not None and not _close(record.recorded_median, analysis.estimates[record.id].value)):
+            off.append(record)
+    if off:
+        yield Warn(NOTE, f"median or interval stored in {_some(off, analysis)} differs from what their samples give; the report uses the"
+                   f" samples (first: line {off[0].line}).")
+
+
+def _close(a: float, b: float) -> bool:
+    return math.isclose(a, b, rel_tol=1e-4, abs_tol=1e-6)
+
+
+def _images(analysis: Analysis) -> Iterator[Warn]:
+    directory = analysis.study.directory.resolve()
+    lost = []
+    for scene, name in analysis.study.context["images"].items():
+        path = (directory / str(name)).resolve()
+        if not path.is_relative_to(directory) or not path.is_file():
+            lost.append(str(scene))
+    if lost:
+        yield Warn(NOTE, f"no picture found for {text.listing(lost)}.")

@@ -1,0 +1,54 @@
+// The subcommands of rasterbench. Each function adds one to the program and runs it from its callback.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "harness/point.h"
+
+namespace rasterbench {
+
+/// What main returns; set by the subcommand that ran.
+struct Outcome {
+  int exit_code = 0;
+};
+
+void add_render_command(CLI::App& app);
+void add_study_command(CLI::App& app, Outcome& outcome, const std::vector<std::string>& benchmark_flags);
+void add_list_command(CLI::App& app);
+void add_scene_command(CLI::App& app);
+void add_runner_command(CLI::App& app, Outcome& outcome, const std::vector<std::string>& benchmark_flags);
+
+/// How one picture is drawn, as options of a command.
+struct DrawOptions {
+  std::string kernel = "tile_parallel";
+  std::string numeric = "f32";
+  std::string backend = "openmp";
+  std::string schedule;  ///< KIND[,CHUNK]; empty: dynamic for openmp, auto for tbb
+  int threads = 0;       ///< 0: all CPUs
+  bool oversubscribe = false;
+  std::string size;  ///< WxH; empty: the scene's
+  std::string fill = "closed";
+  std::string near_rule = "clip";
+  std::string tie = "first";
+  std::string cull = "none";
+  int tile = 64;
+};
+
+/// The execution that the options ask for; throws InputError.
+ExecutionConfig execution_of(const DrawOptions& options);
+
+/// Draws one picture and writes what is asked for; shared by `render` and `graphics`.
+struct Drawing {
+  std::string model, scene_file, image, ids, depth;
+  int frames = 1;  ///< timed ones, after an untimed one
+  bool quiet = false;
+};
+void draw(const Drawing& drawing, const DrawOptions& options);
+
+/// Runs `body`; prints what it throws as one line on stderr and returns the exit code.
+int guarded_main(const char* program, const std::function<int()>& body);
+
+}  // namespace rasterbench

@@ -1,0 +1,374 @@
+#include "harness/coordinator.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <memory>
+
+#include "base/error.h"
+#include "base/hash.h"
+#include "harness/context.h"
+#include "harness/google_benchmark.h"
+#include "harness/process.h"
+#include "harness/progress.h"
+#include "harness/run.h"
+#include "harness/runner.h"
+#include "harness/statistics.h"
+#include "kernels/kernel.h"
+#include "scene/image.h"
+
+namespace rasterbench {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr double kVerifyTimeout = 3600;  // seconds: a specification of a huge picture takes its time
+constexpr double kSampleTimeout = 600;
+constexpr double kShortFrameMs =
+    0.5;  // below it, so many frames make one sample that it is not all clock and start-up
+
+/// Points that are compared with each other: everything but strategy, execution and environment is equal.
+std::string group_of(const Point& point) {
+  Point group = point;
+  group.kernel = "null";
+  group.execution = {};
+  group.environment = {};
+  return point_name(group);
+}
+
+/// Two studies writing into one folder would destroy both: the first holds a lock until it ends.
+class FolderLock {
+ public:
+  explicit FolderLock(const std::filesystem::path& folder) {
+    file_ = open((folder / ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+    if (file_ < 0) throw InputError({.file = folder.string(), .field = "--out"}, "cannot be written");
+    if (flock(file_, LOCK_EX | LOCK_NB) != 0) {
+      close(file_);
+      throw InputError({.file = folder.string(), .field = "--out"},
+                       "another study is writing into this folder");
+    }
+  }
+  ~FolderLock() { close(file_); }
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+
+ private:
+  int file_;
+};
+
+class Coordinator {
+ public:
+  Coordinator(const Study& study, const StudyOptions& study_options, const CoordinatorOptions& options)
+      : study_(study), study_options_(study_options), options_(options), begin_(Clock::now()) {}
+
+  int run() {
+    const std::string build = build_id();
+    states_ = initial_states(study_, build);
+    const Json start = start_event(study_, states_, build);
+    prepare_folder();
+    const FolderLock lock(options_.out);
+    const auto journal_path = options_.out / "journal.jsonl";
+    const bool resumed = options_.resume && std::filesystem::exists(journal_path);
+    if (resumed) replay(read_journal(journal_path), start, journal_path, states_);
+    journal_ = std::make_unique<Journal>(journal_path);
+    Json event = resumed ? Json{{"event", "resume"}} : start;
+    event["at"] = utc_now();
+    journal_->append(event);
+
+    Json context = describe_context(study_, study_options_, options_.custom_context);
+    verify_points();
+    draw_images(context);
+    sample_points();
+    return finish(context);
+  }
+
+ private:
+  void prepare_folder() {
+    const auto& out = options_.out;
+    std::error_code error;
+    const bool holds_study = std::filesystem::exists(out / "journal.jsonl", error);
+    if (holds_study && !options_.resume && !options_.replace)
+      throw InputError({.file = out.string(), .field = "--out"},
+                       "holds a study already; add --resume to continue it or --replace to start afresh");
+    if (holds_study && options_.replace) {
+      const std::filesystem::path previous = out.string() + ".previous";
+      std::filesystem::remove_all(previous, error);
+      std::filesystem::rename(out, previous, error);
+      if (error) throw InputError({.file = out.string(), .field = "--replace"}, error.message());
+    }
+    std::filesystem::create_directories(out, error);
+    if (error || !std::filesystem::is_directory(out))
+      throw InputError({.file = out.string(), .field = "--out"},
+                       "cannot be made: " + (error ? error.message() : "not a folder"));
+  }
+
+  double elapsed() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
+  bool out_of_time(double needed = 0) const {
+    return study_.sampling.time_limit > 0 && elapsed() + needed > study_.sampling.time_limit;
+  }
+
+  void record_event(Json event, PointState& state) {
+    event["id"] = state.id;
+    apply_event(event, state);
+    journal_->append(event);
+  }
+
+  /// The process that runs points of `environment`, started when it is first needed.
+  Process& runner(std::map<Environment, std::unique_ptr<Process>>& processes,
+                  const Environment& environment) {
+    auto& process = processes[environment];
+    if (!process || !process->alive()) {
+      std::vector<std::string> arguments{"runner"};
+      arguments.insert(arguments.end(), options_.benchmark_flags.begin(), options_.benchmark_flags.end());
+      process = std::make_unique<Process>(arguments, environment_variables(environment));
+    }
+    return *process;
+  }
+
+  /// Asks the environment's verifier; what goes wrong fails the point, not the study.
+  template <class OnAnswer>
+  void ask_verifier(PointState& state, const Json& request, OnAnswer on_answer) {
+    try {
+      on_answer(runner(verifiers_, state.planned->point.environment).ask(request, kVerifyTimeout));
+    } catch (const InputError& error) {  // the environment cannot be had on this machine
+      record_event({{"event", "skip"}, {"reason", error.what()}}, state);
+    } catch (const ProcessError& error) {
+      record_event({{"event", "fail"}, {"reason", error.what()}}, state);
+    }
+  }
+
+  void verify_points() {
+    std::vector<PointState*> unverified;
+    for (PointState& state : states_)
+      if (state.open() && state.judgement.is_null()) unverified.push_back(&state);
+    // Grouped by what they are compared with, so that it is drawn once.
+    std::stable_sort(unverified.begin(), unverified.end(), [](const PointState* a, const PointState* b) {
+      return group_of(a->planned->point) < group_of(b->planned->point);
+    });
+    std::size_t done = 0;
+    for (PointState* state : unverified) {
+      progress_.show("verifying", static_cast<double>(done++), static_cast<double>(unverified.size()),
+                     state->planned->name);
+      ask_verifier(
+          *state, {{"op", "verify"}, {"point", point_to_json(state->planned->point)}},
+          [&](const Json& judgement) {
+            const double frame_ms = judgement.at("frame_ms");
+            const int frames =
+                frame_ms < kShortFrameMs ? static_cast<int>(std::clamp(1.0 / frame_ms, 1.0, 1000.0)) : 1;
+            record_event({{"event", "verify"}, {"judgement", judgement}, {"frames", frames}}, *state);
+          });
+      if (!state->failure.empty()) progress_.note("FAILED " + state->planned->name + ": " + state->failure);
+    }
+  }
+
+  /// A picture of each scene for the report, by the first point of it that passed.
+  void draw_images(Json& context) {
+    Json& images = context["images"] = Json::object();
+    for (PointState& state : states_) {
+      const std::string& scene = state.planned->point.scene.name;
+      if (!state.timed() || state.judgement.is_null() || images.contains(scene)) continue;
+      std::string file = scene;
+      for (char& c : file)
+        if (!std::isalnum(static_cast<unsigned char>(c)) && c != '-' && c != '_' && c != '.') c = '_';
+      const std::string path = fmt::format("images/{}.png", file);
+      std::filesystem::create_directories(options_.out / "images");
+      const Json request{{"op", "image"},
+                         {"point", point_to_json(state.planned->point)},
+                         {"path", (options_.out / path).string()}};
+      ask_verifier(state, request, [&](const Json&) { images[scene] = path; });
+    }
+    verifiers_.clear();
+  }
+
+  /// The fastest point on the serial backend of each group, once all of them have been sampled often enough
+  /// to tell: base (a).
+  std::map<std::string, const PointState*> fastest_serial() const {
+    std::map<std::string, const PointState*> fastest;
+    for (const PointState& state : states_) {
+      if (!state.timed() || state.samples.empty() || state.planned->point.execution.backend != "serial")
+        continue;
+      const PointState*& best = fastest[group_of(state.planned->point)];
+      if (!best || median(state.times_ms()) < median(best->times_ms())) best = &state;
+    }
+    return fastest;
+  }
+
+  /// Points to sample in the next block: those that have not stopped, and the bases that these are compared
+  /// with.
+  std::vector<PointState*> next_block() {
+    std::map<std::string, bool> open_group, open_family;
+    for (const PointState& state : states_)
+      if (state.open())
+        open_group[group_of(state.planned->point)] = open_family[family_of(state.planned->point)] = true;
+    const auto fastest = fastest_serial();
+    std::vector<PointState*> block;
+    for (PointState& state : states_) {
+      if (!state.timed()) continue;
+      const Point& point = state.planned->point;
+      const auto base = fastest.find(group_of(point));
+      const bool is_base = (base != fastest.end() && base->second == &state && open_group[group_of(point)]) ||
+                           (point.execution.threads == 1 && open_family[family_of(point)]);
+      if (state.open() || is_base) block.push_back(&state);
+    }
+    return block;
+  }
+
+  void sample_points() {
+    int block = 0;
+    for (const PointState& state : states_)
+      for (const Sample& sample : state.samples) block = std::max(block, sample.block);
+    double block_seconds = 0;
+    for (;; ++block) {
+      std::vector<PointState*> order = next_block();
+      std::erase_if(order,
+                    [&](const PointState* state) {  // taken before the interruption that --resume continues
+                      return !state->samples.empty() && state->samples.back().block == block;
+                    });
+      const bool any_open =
+          std::any_of(order.begin(), order.end(), [](const PointState* s) { return s->open(); });
+      if (!any_open) {
+        const auto waiting = [](const PointState& state) { return state.open(); };
+        if (std::none_of(states_.begin(), states_.end(), waiting)) return;
+        close_points();
+        continue;
+      }
+      if (block > 0 && out_of_time(block_seconds)) return stop_for_time();
+      Random random(study_.seed * 1000003 + static_cast<std::uint64_t>(block));
+      for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random.bits() % i]);
+      const auto block_begin = Clock::now();
+      for (PointState* state : order) {
+        if (block == 0 ? false : out_of_time()) return stop_for_time();
+        show_sampling(block);
+        take_sample(*state, block);
+      }
+      block_seconds = std::chrono::duration<double>(Clock::now() - block_begin).count();
+      close_points();
+    }
+  }
+
+  void take_sample(PointState& state, int block) {
+    const Point& point = state.planned->point;
+    const int launch = block % study_.sampling.launches;
+    auto& processes = runners_[launch];
+    try {
+      Process& process = runner(processes, point.environment);
+      if (&process != running_ && running_ && running_->alive()) running_->pause();
+      running_ = &process;
+      process.resume();
+      const Json answer = process.ask({{"op", "sample"},
+                                       {"point", point_to_json(point)},
+                                       {"name", state.planned->name},
+                                       {"frames", state.frames}},
+                                      kSampleTimeout);
+      if (const int observed = answer.at("threads_observed"); observed < point.execution.threads)
+        return record_event(
+            {{"event", "fail"},
+             {"reason", fmt::format("{} of {} threads ran", observed, point.execution.threads)}},
+            state);
+      record_event({{"event", "sample"}, {"block", block}, {"launch", launch}, {"answer", answer}}, state);
+    } catch (const ProcessError& error) {
+      record_event({{"event", "fail"}, {"reason", error.what()}}, state);
+      progress_.note("FAILED " + state.planned->name + ": " + state.failure);
+    }
+  }
+
+  void close_points() {
+    const SamplingPlan& plan = study_.sampling;
+    for (PointState& state : states_) {
+      if (!state.open() || state.samples.empty()) continue;
+      const auto n = static_cast<int>(state.samples.size());
+      const std::vector<double> times = state.times_ms();
+      const auto interval = median_interval(times);
+      std::string reason;
+      if (n >= plan.min_samples && n >= plan.launches && interval &&
+          (interval->second - interval->first) / 2 <= plan.target * median(times))
+        reason = "target";
+      else if (n >= plan.max_samples)
+        reason = "max_samples";
+      else if (n >= plan.min_samples && state.spent_ms >= plan.point_seconds * 1e3)
+        reason = "point_seconds";
+      if (!reason.empty()) record_event({{"event", "stop"}, {"reason", reason}}, state);
+    }
+  }
+
+  void stop_for_time() {
+    for (PointState& state : states_)
+      if (state.open() && !state.samples.empty())
+        record_event({{"event", "stop"}, {"reason", "time_limit"}}, state);
+  }
+
+  void show_sampling(int block) {
+    std::size_t stopped = 0, timed = 0;
+    for (const PointState& state : states_) {
+      timed += state.timed();
+      stopped += state.timed() && !state.open();
+    }
+    // The nearer of two ends: all blocks taken, or all time used.
+    double share = static_cast<double>(block) / study_.sampling.max_samples;
+    if (study_.sampling.time_limit > 0) share = std::max(share, elapsed() / study_.sampling.time_limit);
+    share =
+        std::max(share, static_cast<double>(stopped) / static_cast<double>(std::max<std::size_t>(timed, 1)));
+    progress_.show("sampling", share, 1,
+                   fmt::format("block {}, {} of {} points finished", block + 1, stopped, timed));
+  }
+
+  int finish(Json& context) {
+    std::int64_t run = 0, skipped = 0, failed = 0;
+    for (const PointState& state : states_) {
+      const bool skip = !state.skip.empty();
+      const bool ok = state.timed() && !state.samples.empty();
+      ++(skip ? skipped : ok ? run : failed);
+    }
+    context["points"] = {{"planned", states_.size()}, {"run", run}, {"skipped", skipped}, {"failed", failed}};
+    const std::string id = hash_bytes(context.dump());
+    Json whole;
+    whole["schema"] = context.at("schema");
+    whole["id"] = id;
+    whole["started"] = read_journal(options_.out / "journal.jsonl").front().at("at");
+    whole["finished"] = utc_now();
+    whole.update(context);
+    std::string lines;
+    std::vector<Json> records;
+    for (const PointState& state : states_) {
+      records.push_back(make_record(state, study_, id));
+      lines += records.back().dump() + "\n";
+    }
+    write_file(options_.out / "context.json", whole.dump(2) + "\n");
+    write_file(options_.out / "records.jsonl", lines);
+    if (!options_.benchmark_out.empty())
+      write_file(options_.benchmark_out, google_benchmark_report(records, options_.benchmark_out_format));
+    progress_.note("");
+    if (options_.benchmark_format.empty())
+      fmt::print("{}\n", summary_table(states_));
+    else
+      fmt::print("{}", google_benchmark_report(records, options_.benchmark_format));
+    fmt::print(stderr, "{} planned, {} run, {} skipped, {} failed; records in {}\n", states_.size(), run,
+               skipped, failed, (options_.out / "records.jsonl").string());
+    return failed == 0 ? 0 : 1;
+  }
+
+  const Study& study_;
+  const StudyOptions& study_options_;
+  const CoordinatorOptions& options_;
+  Clock::time_point begin_;
+  std::vector<PointState> states_;
+  std::unique_ptr<Journal> journal_;
+  std::map<Environment, std::unique_ptr<Process>> verifiers_;
+  std::map<int, std::map<Environment, std::unique_ptr<Process>>> runners_;  // by launch
+  Process* running_ = nullptr;
+  Progress progress_;
+};
+
+}  // namespace
+
+int run_study(const Study& study, const StudyOptions& study_options, const CoordinatorOptions& options) {
+  if (study.points.empty()) throw InputError({.file = study.file}, "no point is left to run (filter, shard)");
+  catch_interrupts();
+  return Coordinator(study, study_options, options).run();
+}
+
+}  // namespace rasterbench

@@ -1,0 +1,143 @@
+#include <fmt/format.h>
+
+#include "base/error.h"
+#include "harness/commands.h"
+#include "harness/study.h"
+#include "kernels/kernel.h"
+#include "scene/generator.h"
+
+namespace rasterbench {
+namespace {
+
+Json list_kernels() {
+  Json list = Json::array();
+  for (const Kernel& kernel : kernels()) {
+    const KernelInfo& info = kernel.info();
+    if (info.hidden) continue;
+    Json numerics = Json::array(), left_out = Json::object();
+    for (const Kernel::Variant& variant : kernel.variants())
+      variant.make ? numerics.push_back(variant.mode)
+                   : (void)(left_out[std::string(variant.mode)] = variant.reason);
+    list.push_back({{"name", info.name},
+                    {"parallel_unit", info.parallel_unit},
+                    {"synchronisation", info.synchronisation},
+                    {"work", info.work},
+                    {"numerics", numerics},
+                    {"not_in", left_out}});
+  }
+  return list;
+}
+
+Json list_numerics() {
+  Json list = Json::array();
+  for (const ModeInfo& info : mode_infos())
+    list.push_back({{"name", info.name},
+                    {"vertices", info.vertices},
+                    {"edges", info.edges},
+                    {"depth", info.depth},
+                    {"bound", info.bound}});
+  return list;
+}
+
+Json list_backends() {
+  Json list = Json::array();
+  for (const std::string& name : backends())
+    list.push_back(
+        {{"name", name}, {"runtime", name == "openmp" ? openmp_runtime() : name}, {"available", true}});
+  if (is_left_out("tbb"))
+    list.push_back(
+        {{"name", "tbb"}, {"runtime", "oneTBB was not found when this was built"}, {"available", false}});
+  return list;
+}
+
+Json list_schedules() {
+  Json list = Json::array();
+  for (const Schedule& schedule : schedules())
+    list.push_back(
+        {{"name", schedule.name.empty() ? schedule.backend : schedule.backend + ":" + schedule.name},
+         {"meaning", schedule.meaning},
+         {"chunk", schedule.chunk.empty() ? Json() : Json(schedule.chunk)}});
+  return list;
+}
+
+Json list_scenes() {
+  Json list = Json::array();
+  for (const Generator& generator : generators()) {
+    Json keys = Json::array();
+    for (const GeneratorKey& key : generator.keys) {
+      Json entry{{"name", key.name}, {"meaning", key.meaning}};
+      if (key.words.empty()) {
+        entry["default"] = key.default_value;
+        entry["range"] = {key.minimum, key.maximum};
+      } else {
+        entry["default"] = key.words.at(static_cast<std::size_t>(key.default_value));
+        entry["words"] = key.words;
+      }
+      keys.push_back(std::move(entry));
+    }
+    list.push_back({{"name", generator.name}, {"meaning", generator.meaning}, {"keys", keys}});
+  }
+  return list;
+}
+
+Json list_studies() {
+  Json list = Json::array();
+  for (const auto& file : known_studies())
+    list.push_back({{"name", file.stem().string()}, {"file", file.string()}});
+  return list;
+}
+
+std::string shown(const Json& value) {
+  if (value.is_string()) return value.get<std::string>();
+  if (value.is_number_float() && value.get<double>() == static_cast<double>(value.get<std::int64_t>()))
+    return std::to_string(value.get<std::int64_t>());
+  return value.dump();
+}
+
+/// Each entry as its name and one indented line a field; lists of entries (a generator's keys) one level
+/// deeper.
+void print_entries(const Json& list, int indent) {
+  for (const Json& entry : list) {
+    fmt::print("{:{}}{}\n", "", indent, entry.at("name").get<std::string>());
+    for (const auto& [key, value] : entry.items()) {
+      if (key == "name" || value.is_null() || value.empty()) continue;
+      if (value.is_array() && value.front().is_object()) {
+        print_entries(value, indent + 4);
+      } else if (value.is_array()) {
+        std::string words;
+        for (const Json& word : value) words += (words.empty() ? "" : ", ") + shown(word);
+        fmt::print("{:{}}{}: {}\n", "", indent + 4, key, words);
+      } else if (value.is_object()) {
+        for (const auto& [name, text] : value.items())
+          fmt::print("{:{}}{} {}: {}\n", "", indent + 4, key, name, shown(text));
+      } else {
+        fmt::print("{:{}}{}: {}\n", "", indent + 4, key, shown(value));
+      }
+    }
+  }
+}
+
+}  // namespace
+
+void add_list_command(CLI::App& app) {
+  CLI::App* command = app.add_subcommand("list", "what there is to choose from");
+  const auto what = std::make_shared<std::string>();
+  const auto json = std::make_shared<bool>(false);
+  static const std::map<std::string, Json (*)()> kLists{
+      {"kernels", list_kernels},     {"numerics", list_numerics}, {"backends", list_backends},
+      {"schedules", list_schedules}, {"scenes", list_scenes},     {"studies", list_studies}};
+  command->add_option("WHAT", *what, "kernels, numerics, backends, schedules, scenes or studies")->required();
+  command->add_flag("--json", *json, "an array of objects that have a \"name\"");
+  command->callback([what, json] {
+    std::vector<std::string> known;
+    for (const auto& [name, list] : kLists) known.push_back(name);
+    check_word(*what, known, "list");
+    const Json list = kLists.at(*what)();
+    if (*json)
+      fmt::print("{}\n", list.dump(2));
+    else
+      print_entries(list, 0);
+  });
+}
+
+}  // namespace rasterbench

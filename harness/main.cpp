@@ -1,0 +1,51 @@
+// rasterbench: the command line.
+#include <fmt/format.h>
+
+#include <string>
+#include <vector>
+
+#include "build_info.h"
+#include "harness/commands.h"
+
+namespace {
+
+int run(int argc, char** argv) {
+  using namespace rasterbench;
+  CLI::App app("rasterbench: parallel strategies for triangle rasterization on CPUs, compared",
+               "rasterbench");
+  app.set_version_flag("--version",
+                       fmt::format("rasterbench {} ({})", build_info::kVersion, build_info::kCommit));
+  app.require_subcommand(1);
+  app.set_help_all_flag("--help-all", "the options of all subcommands");
+
+  // Google Benchmark's options have their own syntax and their own parser.
+  std::vector<std::string> arguments, benchmark_flags;
+  for (int i = argc - 1; i > 0; --i) {  // CLI11 takes them in reverse
+    const std::string argument(argv[i]);
+    if (argument.starts_with("--benchmark_"))
+      benchmark_flags.insert(benchmark_flags.begin(), argument);
+    else
+      arguments.push_back(argument);
+  }
+
+  Outcome outcome;
+  add_render_command(app);
+  add_study_command(app, outcome, benchmark_flags);
+  add_list_command(app);
+  add_scene_command(app);
+  add_runner_command(app, outcome, benchmark_flags);
+  try {
+    app.parse(arguments);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
+    fmt::print(stderr, "rasterbench: {}; see --help\n", error.what());
+    return 2;
+  }
+  return outcome.exit_code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return rasterbench::guarded_main("rasterbench", [&] { return run(argc, argv); });
+}

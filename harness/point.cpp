@@ -1,0 +1,154 @@
+#include "harness/point.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <filesystem>
+
+#include "base/error.h"
+#include "base/suggest.h"
+#include "kernels/kernel.h"
+
+namespace rasterbench {
+namespace {
+
+/// A whole decimal number in [low, high].
+int parse_integer(std::string_view text, int low, int high, const std::string& field,
+                  const std::string& what) {
+  int value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || value < low || value > high)
+    throw InputError({.field = field},
+                     fmt::format("{} '{}' is not a whole number from {} to {}", what, text, low, high));
+  return value;
+}
+
+constexpr int kMaxChunk = 1 << 30;
+
+}  // namespace
+
+SceneReference parse_scene_reference(const std::string& text) {
+  const auto at = text.find('@');
+  SceneReference scene{text.substr(0, at), text.substr(0, at),
+                       at == std::string::npos ? "" : text.substr(at + 1)};
+  if (const std::filesystem::path model(scene.model);
+      model.has_extension() && scene.model.find(':') == std::string::npos) {
+    scene.name = model.stem().string();
+    const std::string view = std::filesystem::path(scene.parameters).stem().string();
+    if (!view.empty() && view != scene.name) scene.name += "@" + view;
+  }
+  return scene;
+}
+
+FrameSettings Point::settings() const {
+  FrameSettings settings{.width = width, .height = height, .fill = fill};
+  settings.geometry.near_rule = near_rule;
+  settings.tile = tile;
+  return settings;
+}
+
+std::string point_name(const Point& p) {
+  std::string name =
+      fmt::format("{}/{}x{}/{}/{}/{}/{}/{}/{}", p.scene.name, p.width, p.height, p.kernel, p.numeric,
+                  kFillRules[p.fill == FillRule::kTopLeft], kNearRules[p.near_rule == NearRule::kOff],
+                  to_string(p.execution), p.execution.threads);
+  const Environment normal;
+  if (p.environment.binding != normal.binding) name += "/binding:" + p.environment.binding;
+  if (p.environment.wait_policy != normal.wait_policy) name += "/wait:" + p.environment.wait_policy;
+  if (p.environment.runtime != normal.runtime) name += "/runtime:" + p.environment.runtime;
+  if (find_kernel(p.kernel).info().has_tiles && p.tile != 64) name += fmt::format("/tile:{}", p.tile);
+  if (p.cache != "warm") name += "/cache:" + p.cache;
+  return name;
+}
+
+Json point_config(const Point& p) {
+  Json config;
+  config["scene"] = p.scene.name;
+  config["size"] = {p.width, p.height};
+  config["kernel"] = p.kernel;
+  config["numeric"] = p.numeric;
+  config["fill"] = kFillRules[p.fill == FillRule::kTopLeft];
+  config["near"] = kNearRules[p.near_rule == NearRule::kOff];
+  config["backend"] = p.execution.backend;
+  config["schedule"] = p.execution.schedule.empty() ? Json() : Json(p.execution.schedule);
+  config["chunk"] = p.execution.chunk ? Json(*p.execution.chunk) : Json();
+  config["threads"] = p.execution.threads;
+  config["binding"] = p.environment.binding;
+  config["wait_policy"] = p.environment.wait_policy;
+  config["runtime"] = p.environment.runtime;
+  config["tile"] = find_kernel(p.kernel).info().has_tiles ? Json(p.tile) : Json();
+  config["isa"] = "baseline";
+  config["output"] = "rgba8+f32";
+  config["cache"] = p.cache;
+  return config;
+}
+
+Json point_to_json(const Point& p) {
+  Json json = point_config(p);
+  json["tile"] = p.tile;
+  json["model"] = p.scene.model;
+  json["parameters"] = p.scene.parameters;
+  return json;
+}
+
+Point point_from_json(const Json& json) {
+  Point p;
+  p.scene = {json.at("scene"), json.at("model"), json.at("parameters")};
+  p.width = json.at("size").at(0);
+  p.height = json.at("size").at(1);
+  p.kernel = json.at("kernel");
+  p.numeric = json.at("numeric");
+  p.fill = parse_fill(json.at("fill"), "fill");
+  p.near_rule = parse_near(json.at("near"), "near");
+  p.execution.backend = json.at("backend");
+  if (!json.at("schedule").is_null()) p.execution.schedule = json.at("schedule");
+  if (!json.at("chunk").is_null()) p.execution.chunk = json.at("chunk").get<int>();
+  p.execution.threads = json.at("threads");
+  p.environment = {json.at("binding"), json.at("wait_policy"), json.at("runtime")};
+  p.tile = json.at("tile");
+  p.cache = json.at("cache");
+  return p;
+}
+
+void parse_schedule(const std::string& text, const std::string& field, ExecutionConfig& execution) {
+  const auto comma = text.find(',');
+  execution.schedule = text.substr(0, comma);
+  execution.chunk.reset();
+  if (comma != std::string::npos)
+    execution.chunk = parse_integer(std::string_view(text).substr(comma + 1), 1, kMaxChunk, field, "chunk");
+}
+
+ExecutionConfig parse_execution(const std::string& text, const std::string& field) {
+  ExecutionConfig execution;
+  const auto colon = text.find(':');
+  execution.backend = text.substr(0, colon);
+  if (colon != std::string::npos) parse_schedule(text.substr(colon + 1), field, execution);
+  return execution;
+}
+
+std::pair<int, int> parse_size(const std::string& text, const std::string& field) {
+  const auto x = text.find('x');
+  if (x == std::string::npos)
+    throw InputError({.field = field}, fmt::format("'{}' is not a size such as 1920x1080", text));
+  const std::string_view view(text);
+  return {parse_integer(view.substr(0, x), 1, kMaxImageSide, field, "width"),
+          parse_integer(view.substr(x + 1), 1, kMaxImageSide, field, "height")};
+}
+
+void check_word(const std::string& word, const std::vector<std::string>& known, const std::string& field) {
+  if (std::find(known.begin(), known.end(), word) == known.end())
+    throw InputError({.field = field}, unknown_name("value", word, known));
+}
+
+FillRule parse_fill(const std::string& text, const std::string& field) {
+  check_word(text, kFillRules, field);
+  return text == "closed" ? FillRule::kClosed : FillRule::kTopLeft;
+}
+
+NearRule parse_near(const std::string& text, const std::string& field) {
+  check_word(text, kNearRules, field);
+  return text == "clip" ? NearRule::kClip : NearRule::kOff;
+}
+
+}  // namespace rasterbench

@@ -1,0 +1,86 @@
+// A point: one configuration of a study.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "execution/execution.h"
+#include "pipeline/frame.h"
+#include "scene/scene.h"
+
+namespace rasterbench {
+
+using Json = nlohmann::ordered_json;  // keeps the order in which keys are written
+
+/// A scene as a study names it.
+struct SceneReference {
+  std::string name;        ///< short label, unique in the study
+  std::string model;       ///< MODEL: a path or a generator's specification
+  std::string parameters;  ///< SCENE.txt, or empty
+};
+
+/// "MODEL" or "MODEL@SCENE.txt"; the label is the generator's specification or the files' stems.
+SceneReference parse_scene_reference(const std::string& text);
+
+/// What is fixed when a process starts; a runner process serves one environment.
+struct Environment {
+  std::string binding = "none";         ///< OMP_PROC_BIND: none, close, spread
+  std::string wait_policy = "default";  ///< OMP_WAIT_POLICY: default, active, passive
+  std::string runtime =
+      "default";  ///< the OpenMP runtime: default (what the build links), libomp by preloading it
+
+  auto operator<=>(const Environment&) const = default;
+};
+
+/// The known words of each field of Environment.
+inline const std::vector<std::string> kBindings{"none", "close", "spread"};
+inline const std::vector<std::string> kWaitPolicies{"default", "active", "passive"};
+inline const std::vector<std::string> kRuntimes{"default", "libomp"};
+inline const std::vector<std::string> kFillRules{"closed", "top-left"};
+inline const std::vector<std::string> kNearRules{"clip", "off"};
+inline const std::vector<std::string> kCaches{"warm", "cold"};
+
+struct Point {
+  SceneReference scene;
+  int width = 0;  ///< pixels
+  int height = 0;
+  std::string kernel;
+  std::string numeric = "f32";
+  FillRule fill = FillRule::kClosed;
+  NearRule near_rule = NearRule::kClip;
+  ExecutionConfig execution;
+  Environment environment;
+  int tile = 64;               ///< pixels; counts only for kernels that have tiles
+  std::string cache = "warm";  ///< warm, or cold: the caches are swept before each sample
+
+  FrameSettings settings() const;
+};
+
+/// "scene/WxH/kernel/numeric/fill/near/backend:schedule,chunk/threads" and the axes that differ from their
+/// defaults: what
+/// --filter matches.
+std::string point_name(const Point& point);
+
+/// The record's `config`, without the scene's hash.
+Json point_config(const Point& point);
+
+/// Everything that a runner process needs to run the point, and back.
+Json point_to_json(const Point& point);
+Point point_from_json(const Json& json);
+
+/// "static", "dynamic,16" split into a schedule and a chunk; `field` names the option in errors.
+void parse_schedule(const std::string& text, const std::string& field, ExecutionConfig& execution);
+
+/// "serial", "openmp:dynamic,16".
+ExecutionConfig parse_execution(const std::string& text, const std::string& field);
+
+/// "1920x1080"; both sides in 1 .. 65536.
+std::pair<int, int> parse_size(const std::string& text, const std::string& field);
+
+FillRule parse_fill(const std::string& text, const std::string& field);
+NearRule parse_near(const std::string& text, const std::string& field);
+
+/// Throws InputError naming `field` unless `word` is one of `known`.
+void check_word(const std::string& word, const std::vector<std::string>& known, const std::string& field);
+
+}  // namespace rasterbench

@@ -1,0 +1,138 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "base/error.h"
+#include "harness/commands.h"
+#include "harness/statistics.h"
+#include "kernels/kernel.h"
+#include "scene/image.h"
+
+namespace rasterbench {
+
+ExecutionConfig execution_of(const DrawOptions& options) {
+  ExecutionConfig execution;
+  execution.backend = options.backend;
+  if (!options.schedule.empty())
+    parse_schedule(options.schedule, "--schedule", execution);
+  else
+    execution.schedule = options.backend == "openmp" ? "dynamic" : options.backend == "tbb" ? "auto" : "";
+  const int cpus = available_cpus();
+  execution.threads = options.threads > 0 ? options.threads : options.backend == "serial" ? 1 : cpus;
+  if (execution.threads > cpus && !options.oversubscribe)
+    throw InputError({.field = "--threads"},
+                     fmt::format("{} threads on {} CPUs needs --oversubscribe", execution.threads, cpus));
+  return execution;
+}
+
+void draw(const Drawing& drawing, const DrawOptions& options) {
+  // Everything that can be wrong with the arguments is found before the model is read.
+  if (!drawing.image.empty()) check_image_path(drawing.image);
+  FrameSettings settings;
+  settings.fill = parse_fill(options.fill, "--fill");
+  settings.geometry.near_rule = parse_near(options.near_rule, "--near");
+  check_word(options.tie, {"first", "last"}, "--tie");
+  settings.tie = options.tie == "first" ? TieRule::kFirst : TieRule::kLast;
+  check_word(options.cull, {"none", "back"}, "--cull");
+  settings.geometry.cull_back_faces = options.cull == "back";
+  settings.tile = options.tile;
+  if (!options.size.empty()) std::tie(settings.width, settings.height) = parse_size(options.size, "--size");
+  find_kernel(options.kernel).variant(options.numeric);
+  const ExecutionConfig execution = execution_of(options);
+  find_schedule(execution);
+
+  const Scene scene = open_scene(drawing.model, drawing.scene_file);
+  if (options.size.empty()) {
+    settings.width = scene.parameters.width;
+    settings.height = scene.parameters.height;
+  }
+  const auto renderer = make_renderer(options.kernel, options.numeric, {&scene, settings, execution});
+  const FrameReport* report = &renderer->draw();
+  std::vector<double> times;
+  for (int frame = 0; frame < drawing.frames; ++frame) {
+    report = &renderer->draw();
+    times.push_back(report->seconds.total() * 1e3);
+  }
+
+  if (!drawing.image.empty())
+    write_image(drawing.image, renderer->colours(), settings.width, settings.height);
+  if (!drawing.ids.empty()) write_npy(drawing.ids, renderer->ids(), settings.width, settings.height);
+  if (!drawing.depth.empty()) write_npy(drawing.depth, renderer->depths(), settings.width, settings.height);
+  if (drawing.quiet) return;
+
+  const GeometryCounts& c = report->counts;
+  const StageSeconds& s = report->seconds;
+  fmt::print("{} at {}x{}: {} triangles, {} drawn", drawing.model, settings.width, settings.height,
+             c.triangles, c.drawn);
+  if (c.near_clipped) fmt::print(", {} cut at the near plane", c.near_clipped);
+  if (c.non_finite) fmt::print(", {} with a coordinate that is not finite left out", c.non_finite);
+  if (c.zero_area) fmt::print(", {} without area left out", c.zero_area);
+  fmt::print(
+      "\n{} {} {} on {} thread{}: {:.3f} ms (median of {}; last: clear {:.3f}, geometry {:.3f}, raster "
+      "{:.3f}, resolve {:.3f})\n",
+      options.kernel, options.numeric, to_string(execution), execution.threads,
+      execution.threads == 1 ? "" : "s", median(times), times.size(), s.clear * 1e3, s.geometry * 1e3,
+      s.raster * 1e3, s.resolve * 1e3);
+  for (const std::string& file : {drawing.image, drawing.ids, drawing.depth})
+    if (!file.empty()) fmt::print("wrote {}\n", file);
+}
+
+namespace {
+
+/// MODEL's file name or generator without its folder, keys and extension.
+std::string default_image(const std::string& model) {
+  const std::string name = std::filesystem::path(model.substr(0, model.find(':'))).stem().string();
+  return name + ".png";
+}
+
+void add_draw_options(CLI::App& command, DrawOptions& o) {
+  command.add_option("--kernel", o.kernel, "strategy; see `rasterbench list kernels`")->capture_default_str();
+  command.add_option("--numeric", o.numeric, "numeric mode; see `rasterbench list numerics`")
+      ->capture_default_str();
+  command.add_option("--backend", o.backend, "serial, openmp or tbb")->capture_default_str();
+  command.add_option(
+      "--schedule", o.schedule,
+      "KIND[,CHUNK]; see `rasterbench list schedules` (default: dynamic for openmp, auto for tbb)");
+  command
+      .add_option("--threads", o.threads, "number of threads (default: all CPUs of this process; serial: 1)")
+      ->check(CLI::Range(1, 65536));
+  command.add_flag("--oversubscribe", o.oversubscribe, "allow more threads than CPUs");
+  command.add_option("--size", o.size, "WxH in pixels, each 1 to 65536 (default: the scene's)");
+  command.add_option("--fill", o.fill, "closed (edges belong to both sides) or top-left (to one)")
+      ->capture_default_str();
+  command.add_option("--near", o.near_rule, "clip at the near plane, or off")->capture_default_str();
+  command.add_option("--tie", o.tie, "who wins an equal depth: first or last triangle")
+      ->capture_default_str();
+  command.add_option("--cull", o.cull, "none, or back: leave back faces out")->capture_default_str();
+  command.add_option("--tile", o.tile, "side of a tile in pixels, for kernels that have tiles")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 65536));
+}
+
+}  // namespace
+
+void add_render_command(CLI::App& app) {
+  CLI::App* command = app.add_subcommand("render", "draw one picture and say how long it took");
+  const auto drawing = std::make_shared<Drawing>();
+  const auto options = std::make_shared<DrawOptions>();
+  command->add_option("MODEL", drawing->model, "a .dat file, or a generator such as teapot:triangles=43000")
+      ->required();
+  command->add_option("SCENE", drawing->scene_file,
+                      "scene parameter file (default: a camera that shows the model)");
+  command->add_option("-o,--output", drawing->image,
+                      "IMAGE.ppm or .png (default: the model's name, .png, in this folder)");
+  command->add_option("--ids", drawing->ids, "IDS.npy: int32 (H, W), -1 = background");
+  command->add_option("--depth", drawing->depth, "DEPTH.npy: float32 (H, W), 1 = background");
+  command->add_option("--frames", drawing->frames, "timed frames, after one untimed")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000000));
+  add_draw_options(*command, *options);
+  command->callback([drawing, options] {
+    if (drawing->image.empty() && drawing->ids.empty() && drawing->depth.empty())
+      drawing->image = default_image(drawing->model);
+    draw(*drawing, *options);
+  });
+}
+
+}  // namespace rasterbench

@@ -1,0 +1,183 @@
+#include "harness/run.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "base/error.h"
+#include "base/hash.h"
+#include "harness/statistics.h"
+
+namespace rasterbench {
+namespace {
+
+std::string text_or(const Json& object, const char* key) {
+  return object.contains(key) && object.at(key).is_string() ? object.at(key).get<std::string>()
+                                                            : std::string();
+}
+
+/// Median over samples of each worker's busy time, with the last sample's counts.
+Json per_thread(const PointState& state) {
+  Json threads = Json::array();
+  if (state.samples.empty()) return threads;
+  const Json& last = state.samples.back().answer.at("per_thread");
+  for (std::size_t worker = 0; worker < last.size(); ++worker) {
+    std::vector<double> busy;
+    for (const Sample& sample : state.samples)
+      busy.push_back(sample.answer.at("per_thread").at(worker).at("busy_ms"));
+    threads.push_back({{"busy_ms", median(busy)},
+                       {"iterations", last.at(worker).at("iterations")},
+                       {"cpu", last.at(worker).at("cpu")}});
+  }
+  return threads;
+}
+
+}  // namespace
+
+std::vector<double> PointState::times_ms() const {
+  std::vector<double> times;
+  for (const Sample& sample : samples) times.push_back(sample.ms);
+  return times;
+}
+
+std::vector<PointState> initial_states(const Study& study, const std::string& build) {
+  std::vector<PointState> states;
+  for (const PlannedPoint& planned : study.points) {
+    PointState state;
+    state.planned = &planned;
+    state.id =
+        hash_bytes(point_config(planned.point).dump() + study.hashes.at(planned.point.scene.name) + build);
+    state.skip = planned.skip;
+    states.push_back(std::move(state));
+  }
+  return states;
+}
+
+Json start_event(const Study& study, const std::vector<PointState>& states, const std::string& build) {
+  std::string plan;
+  for (const PointState& state : states) plan += state.id + state.skip + "\n";
+  Json event;
+  event["event"] = "start";
+  event["schema"] = 1;
+  event["study"] = study.name;
+  event["build"] = build;
+  event["scenes"] = study.hashes;
+  event["plan"] = hash_bytes(plan);
+  event["sampling"] = {study.sampling.target,        study.sampling.min_samples, study.sampling.max_samples,
+                       study.sampling.point_seconds, study.sampling.launches,    study.seed};
+  return event;
+}
+
+void replay(const std::vector<Json>& events, const Json& start, const std::filesystem::path& file,
+            std::vector<PointState>& states) {
+  if (events.empty() || text_or(events.front(), "event") != "start")
+    throw InputError({.file = file.string(), .line = 1}, "does not start with a start event");
+  for (const char* key : {"schema", "build", "study", "scenes", "plan", "sampling"})
+    if (!events.front().contains(key) || events.front().at(key) != start.at(key))
+      throw InputError({.file = file.string(), .line = 1, .field = key},
+                       "differs from this study: --resume continues only what it started");
+  std::map<std::string, PointState*> by_id;
+  for (PointState& state : states) by_id[state.id] = &state;
+  for (std::size_t line = 1; line < events.size(); ++line) {
+    const auto found = by_id.find(text_or(events[line], "id"));
+    if (found == by_id.end()) continue;  // "resume" events belong to no point
+    try {
+      apply_event(events[line], *found->second);
+    } catch (const Json::exception& error) {
+      throw InputError({.file = file.string(), .line = static_cast<std::int64_t>(line) + 1}, error.what());
+    }
+  }
+}
+
+void apply_event(const Json& event, PointState& state) {
+  const std::string kind = event.at("event");
+  if (kind == "verify") {
+    state.judgement = event.at("judgement");
+    state.frames = event.at("frames");
+    state.failure = text_or(state.judgement, "failure");
+  } else if (kind == "fail") {
+    state.failure = event.at("reason");
+  } else if (kind == "skip") {
+    state.skip = event.at("reason");
+  } else if (kind == "stop") {
+    state.stop = event.at("reason");
+  } else if (kind == "sample") {
+    state.samples.push_back(
+        {event.at("block"), event.at("launch"), event.at("answer").at("ms"), event.at("answer")});
+    state.spent_ms += state.samples.back().ms * state.frames;
+  }
+}
+
+Json make_record(const PointState& state, const Study& study, const std::string& context_id) {
+  const Point& point = state.planned->point;
+  Json record;
+  record["schema"] = 1;
+  record["id"] = state.id;
+  record["name"] = state.planned->name;
+  Json& config = record["config"] = point_config(point);
+  config["scene_hash"] = study.hashes.at(point.scene.name);
+  const bool ok = state.timed() && !state.samples.empty();
+  record["status"] = !state.skip.empty() ? "skipped" : ok ? "ok" : "failed";
+  if (!ok)
+    record["reason"] = !state.skip.empty()      ? state.skip
+                       : !state.failure.empty() ? state.failure
+                                                : "the study's time limit left no time for a sample";
+
+  // A point that failed shows no speed, even where it was timed before it did.
+  Json launches = Json::array(), blocks = Json::array(), stages;
+  const std::vector<double> times = ok ? state.times_ms() : std::vector<double>{};
+  for (const char* stage : {"clear", "geometry", "raster", "resolve"}) stages[stage] = Json::array();
+  if (ok)
+    for (const Sample& sample : state.samples) {
+      launches.push_back(sample.launch);
+      blocks.push_back(sample.block);
+      for (auto& [stage, values] : stages.items()) values.push_back(sample.answer.at("stages").at(stage));
+    }
+  record["launches"] = launches;
+  record["blocks"] = blocks;
+  record["frames_per_sample"] = state.frames;
+  record["samples_ms"] = times;
+  record["stages_ms"] = stages;
+  const auto interval = median_interval(times);
+  const auto p95 = percentile_95(times);
+  record["median_ms"] = ok ? Json(median(times)) : Json();
+  record["interval_ms"] = interval ? Json{interval->first, interval->second} : Json();
+  record["p95_ms"] = p95 ? Json(*p95) : Json();
+  record["min_ms"] = ok ? Json(*std::min_element(times.begin(), times.end())) : Json();
+  record["max_ms"] = ok ? Json(*std::max_element(times.begin(), times.end())) : Json();
+  record["stop"] = ok ? Json(state.stop.empty() ? "time_limit" : state.stop) : Json();
+  record["verify"] = state.judgement.is_null() ? Json() : state.judgement.value("verify", Json());
+  record["work"] = state.judgement.is_null() ? Json() : state.judgement.value("work", Json());
+  record["threads_observed"] =
+      state.judgement.is_null() ? Json() : state.judgement.value("threads_observed", Json());
+  record["per_thread"] = ok ? per_thread(state) : Json::array();
+  if (ok && state.samples.back().answer.contains("counters"))
+    record["counters"] = state.samples.back().answer.at("counters");
+  record["context"] = context_id;
+  return record;
+}
+
+std::string summary_table(const std::vector<PointState>& states) {
+  std::size_t width = 5;
+  for (const PointState& state : states) width = std::max(width, state.planned->name.size());
+  std::string table = fmt::format("{:<{}}  {:>10}  {:>21}  {:>4}  {}\n", "point", width, "median ms",
+                                  "95 % interval", "n", "stop");
+  for (const PointState& state : states) {
+    const std::vector<double> times = state.times_ms();
+    if (!state.timed() || times.empty()) {
+      const bool skipped = !state.skip.empty();
+      table += fmt::format("{:<{}}  {}: {}\n", state.planned->name, width, skipped ? "skipped" : "FAILED",
+                           skipped                 ? state.skip
+                           : state.failure.empty() ? "no sample"
+                                                   : state.failure);
+      continue;
+    }
+    const auto interval = median_interval(times);
+    table += fmt::format("{:<{}}  {:>10.3f}  {:>21}  {:>4}  {}\n", state.planned->name, width, median(times),
+                         interval ? fmt::format("[{:.3f}, {:.3f}]", interval->first, interval->second) : "-",
+                         times.size(), state.stop.empty() ? "time_limit" : state.stop);
+  }
+  return table;
+}
+
+}  // namespace rasterbench

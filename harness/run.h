@@ -1,0 +1,57 @@
+// The state of a running study: what the journal says of every point, and the records made from it.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "harness/journal.h"
+#include "harness/study.h"
+
+namespace rasterbench {
+
+/// One sample as the runner answered it, with where in the run it was taken.
+struct Sample {
+  int block = 0;
+  int launch = 0;
+  double ms = 0;
+  Json answer;
+};
+
+/// What is known of one planned point.
+struct PointState {
+  const PlannedPoint* planned = nullptr;
+  std::string id;       ///< hash of every axis, the scene's content and the build
+  std::string skip;     ///< reason, or empty
+  std::string failure;  ///< reason, or empty
+  Json judgement;       ///< Verifier::judge, or null
+  int frames = 1;       ///< per sample
+  double spent_ms = 0;  ///< in timed frames
+  std::vector<Sample> samples;
+  std::string stop;  ///< why sampling stopped, or empty
+
+  bool open() const { return skip.empty() && failure.empty() && stop.empty(); }
+  bool timed() const { return skip.empty() && failure.empty(); }
+  std::vector<double> times_ms() const;
+};
+
+/// The states of a study's points, in their order.
+std::vector<PointState> initial_states(const Study& study, const std::string& build);
+
+/// What --resume compares: the build, the plan (ids of all points) and how it is sampled.
+Json start_event(const Study& study, const std::vector<PointState>& states, const std::string& build);
+
+/// Applies the events of a journal. Throws InputError if its start event differs from `start`.
+void replay(const std::vector<Json>& events, const Json& start, const std::filesystem::path& file,
+            std::vector<PointState>& states);
+
+/// Applies one event to the state that it names; the same code for a running study and a replayed one.
+void apply_event(const Json& event, PointState& state);
+
+/// One line of records.jsonl.
+Json make_record(const PointState& state, const Study& study, const std::string& context_id);
+
+/// A table for the terminal: name, median, interval, samples, or the reason why there is none.
+std::string summary_table(const std::vector<PointState>& states);
+
+}  // namespace rasterbench

@@ -1,0 +1,172 @@
+#include "harness/runner.h"
+
+#include <benchmark/benchmark.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <iostream>
+
+#include "base/error.h"
+#include "harness/verify.h"
+#include "kernels/kernel.h"
+#include "scene/image.h"
+
+namespace rasterbench {
+namespace {
+
+/// Takes what Google Benchmark reports of a run instead of printing it.
+class CollectingReporter final : public benchmark::BenchmarkReporter {
+ public:
+  bool ReportContext(const Context&) override { return true; }
+  void ReportRuns(const std::vector<Run>& runs) override {
+    for (const Run& run : runs)
+      if (run.run_type == Run::RT_Iteration) last = run;
+  }
+  Run last;
+};
+
+/// Reads and writes more than any last-level cache holds, so that nothing of the point is left in it.
+void sweep_caches() {
+  static std::vector<std::uint64_t> sink(std::size_t{256} << 17, 1);  // 256 MiB
+  for (std::size_t i = 0; i < sink.size(); i += 8) sink[i] += 1;
+  benchmark::DoNotOptimize(sink.data());
+}
+
+class Runner {
+ public:
+  Json answer(const Json& request) {
+    const Point point = point_from_json(request.at("point"));
+    const std::string op = request.at("op");
+    if (op == "verify") return verifier_.judge(point, scene(point.scene));
+    if (op == "sample") return sample(point, request.at("name"), request.at("frames"));
+    if (op == "image") return image(point, request.at("path").get<std::string>());
+    throw Error("unknown request " + op);
+  }
+
+ private:
+  const Scene& scene(const SceneReference& reference) {
+    auto found = scenes_.find(reference.name);
+    if (found == scenes_.end())
+      found = scenes_.emplace(reference.name, open_scene(reference.model, reference.parameters)).first;
+    return found->second;
+  }
+
+  /// One sample: a fresh renderer, one untimed frame, then `frames` timed ones as one iteration of a Google
+  /// Benchmark run.
+  Json sample(const Point& point, const std::string& name, int frames) {
+    const Scene& drawn = scene(point.scene);
+    Json answer;
+    {
+      const auto probe = make_execution(point.execution);
+      answer["threads_observed"] = observe_threads(*probe).count;
+    }
+    const auto renderer =
+        make_renderer(point.kernel, point.numeric, {&drawn, point.settings(), point.execution});
+    renderer->draw();
+    if (point.cache == "cold") sweep_caches();
+
+    StageSeconds stages;
+    std::vector<WorkerTally> tally;
+    benchmark::ClearRegisteredBenchmarks();
+    benchmark::RegisterBenchmark(
+        name.c_str(),
+        [&](benchmark::State& state) {
+          for ([[maybe_unused]] const auto iteration : state) {
+            const auto begin = std::chrono::steady_clock::now();
+            for (int frame = 0; frame < frames; ++frame) {
+              const FrameReport& report = renderer->draw();
+              stages.clear += report.seconds.clear;
+              stages.geometry += report.seconds.geometry;
+              stages.raster += report.seconds.raster;
+              stages.resolve += report.seconds.resolve;
+              tally = report.raster_tally;
+            }
+            state.SetIterationTime(
+                std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+          }
+        })
+        ->Iterations(1)
+        ->UseManualTime()
+        ->Unit(benchmark::kMillisecond);
+    CollectingReporter reporter;
+    benchmark::RunSpecifiedBenchmarks(&reporter, nullptr, ".");
+    if (reporter.last.error_occurred) throw Error(reporter.last.error_message);
+
+    const double per_frame_ms = 1e3 / frames;
+    answer["ms"] = reporter.last.real_accumulated_time * per_frame_ms;
+    answer["stages"] = {{"clear", stages.clear * per_frame_ms},
+                        {"geometry", stages.geometry * per_frame_ms},
+                        {"raster", stages.raster * per_frame_ms},
+                        {"resolve", stages.resolve * per_frame_ms}};
+    Json& threads = answer["per_thread"] = Json::array();
+    for (const WorkerTally& worker : tally)
+      threads.push_back(
+          {{"busy_ms", worker.busy_seconds * 1e3}, {"iterations", worker.iterations}, {"cpu", worker.cpu}});
+    for (const auto& [counter, value] : reporter.last.counters) answer["counters"][counter] = value.value;
+    return answer;
+  }
+
+  Json image(const Point& point, const std::string& path) {
+    const auto renderer =
+        make_renderer(point.kernel, point.numeric, {&scene(point.scene), point.settings(), point.execution});
+    renderer->draw();
+    write_image(path, renderer->colours(), point.width, point.height);
+    return Json::object();
+  }
+
+  Verifier verifier_;
+  std::map<std::string, Scene> scenes_;
+};
+
+/// Where a distribution puts LLVM's OpenMP runtime.
+std::string find_libomp() {
+  for (const char* path : {"/usr/lib/x86_64-linux-gnu/libomp.so.5", "/usr/lib/aarch64-linux-gnu/libomp.so.5",
+                           "/usr/lib64/libomp.so", "/usr/lib/libomp.so"})
+    if (std::filesystem::exists(path)) return path;
+  return {};
+}
+
+}  // namespace
+
+std::map<std::string, std::string> environment_variables(const Environment& environment) {
+  std::map<std::string, std::string> variables;
+  variables["OMP_PROC_BIND"] = environment.binding == "none" ? "false" : environment.binding;
+  variables["OMP_PLACES"] = environment.binding == "none" ? "" : "cores";
+  variables["OMP_WAIT_POLICY"] = environment.wait_policy == "default" ? "" : environment.wait_policy;
+  variables["OMP_DYNAMIC"] = "false";
+  // What would change a schedule or a thread count behind the study's back.
+  for (const char* name : {"OMP_SCHEDULE", "OMP_NUM_THREADS", "GOMP_CPU_AFFINITY", "KMP_AFFINITY"})
+    variables[name] = "";
+  if (environment.runtime == "libomp") {
+    const std::string path = find_libomp();
+    if (path.empty()) throw InputError("LLVM's OpenMP runtime (libomp) is not installed on this machine");
+    variables["LD_PRELOAD"] = path;
+  }
+  return variables;
+}
+
+int run_runner(const std::vector<std::string>& benchmark_flags) {
+  std::vector<std::string> words{"rasterbench"};
+  words.insert(words.end(), benchmark_flags.begin(), benchmark_flags.end());
+  std::vector<char*> argv;
+  for (std::string& word : words) argv.push_back(word.data());
+  int argc = static_cast<int>(argv.size());
+  benchmark::Initialize(&argc, argv.data());
+
+  Runner runner;
+  for (std::string line; std::getline(std::cin, line);) {
+    Json answer;
+    try {
+      answer = runner.answer(Json::parse(line));
+    } catch (const std::exception& error) {
+      answer = Json::object();
+      answer["error"] = error.what();
+    }
+    std::cout << answer.dump() << std::endl;  // flushed: the coordinator waits for it
+  }
+  return 0;
+}
+
+}  // namespace rasterbench

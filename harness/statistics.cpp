@@ -1,0 +1,45 @@
+#include "harness/statistics.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace rasterbench {
+namespace {
+
+std::vector<double> sorted(std::span<const double> values) {
+  std::vector<double> copy(values.begin(), values.end());
+  std::sort(copy.begin(), copy.end());
+  return copy;
+}
+
+}  // namespace
+
+double median(std::span<const double> values) {
+  const std::vector<double> x = sorted(values);
+  const std::size_t n = x.size();
+  return n % 2 == 1 ? x[n / 2] : (x[n / 2 - 1] + x[n / 2]) / 2;
+}
+
+std::optional<std::pair<double, double>> median_interval(std::span<const double> values) {
+  const std::vector<double> x = sorted(values);
+  const auto n = static_cast<double>(x.size());
+  // Terms of Binomial(n, 1/2) by logarithms: 2^-n underflows for long runs.
+  double below = 0;
+  std::size_t k = 0;
+  for (std::size_t i = 0; 2 * i < x.size(); ++i) {
+    const auto j = static_cast<double>(i);
+    below += std::exp(std::lgamma(n + 1) - std::lgamma(j + 1) - std::lgamma(n - j + 1) - n * std::log(2.0));
+    if (below > 0.025) break;
+    k = i + 1;
+  }
+  if (k == 0) return std::nullopt;
+  return std::pair{x[k - 1], x[x.size() - k]};
+}
+
+std::optional<double> percentile_95(std::span<const double> values) {
+  if (values.size() < 59) return std::nullopt;
+  const std::vector<double> x = sorted(values);
+  return x[static_cast<std::size_t>(std::ceil(0.95 * static_cast<double>(x.size()))) - 1];
+}
+
+}  // namespace rasterbench

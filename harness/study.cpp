@@ -1,0 +1,107 @@
+#include "harness/study.h"
+
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <set>
+
+#include "base/error.h"
+#include "base/suggest.h"
+#include "harness/study_reader.h"
+#include "kernels/kernel.h"
+
+namespace rasterbench {
+namespace {
+
+/// Seconds that a kernel which tests every pixel for every triangle needs per test; measured on one core,
+/// generous.
+constexpr double kSecondsPerTest = 1.0e-9;
+
+/// Why a point will not run, or empty.
+std::string reason_to_skip(const Point& point, const Scene& scene, const SamplingPlan& sampling,
+                           bool oversubscribe) {
+  const Kernel& kernel = find_kernel(point.kernel);
+  const Kernel::Variant& variant = kernel.variant(point.numeric);
+  if (!variant.make)
+    return fmt::format("{} cannot run in mode {}: {}", point.kernel, point.numeric, variant.reason);
+  if (is_left_out(point.execution.backend))
+    return fmt::format("this build has no backend {}", point.execution.backend);
+  if (point.execution.threads > available_cpus() && !oversubscribe)
+    return fmt::format("{} threads on {} CPUs needs --oversubscribe", point.execution.threads,
+                       available_cpus());
+  if (point.execution.backend == "tbb" && point.environment != Environment{})
+    return "binding, wait policy and runtime are OpenMP's; OMP_PROC_BIND would narrow oneTBB to one worker";
+  if (kernel.info().tests_every_pixel) {
+    const double frame = static_cast<double>(scene.model.triangles.size()) * point.width * point.height *
+                         kSecondsPerTest / point.execution.threads;
+    const double cost = frame * 2 * sampling.min_samples;  // each sample is preceded by an untimed frame
+    if (cost > sampling.point_seconds)
+      return fmt::format(
+          "predicted cost of {:.3g} s ({:.3g} s a frame) exceeds the point's time limit of {:g} s", cost,
+          frame, sampling.point_seconds);
+  }
+  return {};
+}
+
+std::uint64_t stable_index(const std::string& family, std::vector<std::string>& seen) {
+  const auto found = std::find(seen.begin(), seen.end(), family);
+  if (found != seen.end()) return static_cast<std::uint64_t>(found - seen.begin());
+  seen.push_back(family);
+  return seen.size() - 1;
+}
+
+}  // namespace
+
+std::string family_of(const Point& point) {
+  Point family = point;
+  family.execution.threads = 0;
+  return point_name(family);
+}
+
+Study read_study(const std::filesystem::path& file, const StudyOptions& options) {
+  Study study = read_study_file(file);
+  if (options.time_limit) study.sampling.time_limit = *options.time_limit;
+  const std::vector<Sweep> sweeps = read_sweeps(file, study.text, options.scenes, options.sizes);
+
+  std::set<std::string> names;
+  std::vector<std::string> families;
+  for (const Sweep& sweep : sweeps) {
+    for (const SceneReference& reference : sweep.scenes)
+      if (!study.scenes.contains(reference.name)) {
+        Scene scene = open_scene(reference.model, reference.parameters);
+        study.hashes[reference.name] = scene_hash(scene);
+        study.scenes.emplace(reference.name, std::move(scene));
+      }
+    span_points(sweep, study.scenes, [&](const Point& point) {
+      PlannedPoint planned{point, point_name(point), {}};
+      if (!names.insert(planned.name).second) return;
+      if (options.filter && std::regex_search(planned.name, *options.filter) == options.filter_excludes)
+        return;
+      const std::uint64_t family = stable_index(family_of(point), families);
+      if (family % static_cast<std::uint64_t>(options.shards) !=
+          static_cast<std::uint64_t>(options.shard - 1))
+        return;
+      planned.skip =
+          reason_to_skip(point, study.scenes.at(point.scene.name), study.sampling, options.oversubscribe);
+      study.points.push_back(std::move(planned));
+    });
+  }
+  return study;
+}
+
+std::vector<std::filesystem::path> known_studies() {
+  std::vector<std::filesystem::path> files;
+  std::error_code missing;
+  // build/PRESET/bin/rasterbench -> the checkout's studies/
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", missing);
+  const auto folder = program.parent_path().parent_path().parent_path().parent_path() / "studies";
+  for (const auto& entry : std::filesystem::directory_iterator(folder, missing))
+    if (entry.path().extension() == ".toml") files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+}  // namespace rasterbench

@@ -1,0 +1,68 @@
+// Studies: a TOML file that spans points.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <regex>
+#include <string>
+#include <vector>
+
+#include "harness/point.h"
+
+namespace rasterbench {
+
+/// When a point has been sampled enough (measuring.md: stopping).
+struct SamplingPlan {
+  double target = 0.02;  ///< stop when half the 95 % interval is within this share of the median
+  int min_samples = 7;   ///< at least 6, below which there is no 95 % interval
+  int max_samples = 40;
+  double point_seconds = 10;  ///< time that the frames of one point may take
+  double time_limit = 0;      ///< seconds for the whole study; 0: none
+  int launches = 1;           ///< processes per environment, in turn by block
+};
+
+/// A planned point, or one that the study asked for but that cannot or will not run.
+struct PlannedPoint {
+  Point point;
+  std::string name;
+  std::string skip;  ///< the reason, or empty
+};
+
+struct Study {
+  std::string name;
+  std::string question;
+  std::string file;
+  std::string text;  ///< the whole file
+  std::uint64_t seed = 1;
+  SamplingPlan sampling;
+  std::vector<PlannedPoint> points;
+  std::map<std::string, Scene> scenes;        ///< by SceneReference::name
+  std::map<std::string, std::string> hashes;  ///< scene_hash, by the same name
+};
+
+/// What the command line adds to or takes from a study file.
+struct StudyOptions {
+  std::vector<std::string> scenes;  ///< "MODEL[@SCENE.txt]": in place of the study's
+  std::vector<std::string> sizes;   ///< "WxH": in place of the study's
+  std::optional<std::regex> filter;
+  bool filter_excludes = false;  ///< keep what does not match
+  int shard = 1, shards = 1;     ///< this process runs shard 1 .. shards
+  std::optional<double> time_limit;
+  bool oversubscribe = false;
+};
+
+/// Reads a study file and spans its points: the cross product of each [[sweep]], duplicates dropped. Opens
+/// every scene. Unknown keys, names and values are InputErrors that name file, line and key, with a
+/// did-you-mean. Paths of models in the file are relative to it.
+Study read_study(const std::filesystem::path& file, const StudyOptions& options);
+
+/// Points are dealt to shards by family: those that differ only in threads stay together, so that a speedup
+/// never compares two machines.
+std::string family_of(const Point& point);
+
+/// The study files that come with the program: those in `studies/` of the source tree it was built from, if
+/// it is there.
+std::vector<std::filesystem::path> known_studies();
+
+}  // namespace rasterbench

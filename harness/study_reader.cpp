@@ -1,0 +1,330 @@
+#include "harness/study_reader.h"
+
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+
+#include "base/error.h"
+#include "base/suggest.h"
+#include "kernels/kernel.h"
+
+namespace rasterbench {
+namespace {
+
+/// Reads the values of one table and remembers which keys were asked for, so that the others are errors.
+class TableReader {
+ public:
+  TableReader(const toml::table& table, std::string file) : table_(table), file_(std::move(file)) {}
+
+  [[noreturn]] void fail(const toml::node& node, const std::string& key, const std::string& message) const {
+    throw InputError(
+        {.file = file_, .line = static_cast<std::int64_t>(node.source().begin.line), .field = key}, message);
+  }
+
+  /// Runs `parse`, putting file and line in front of what it throws.
+  template <class Parse>
+  auto located(const toml::node& node, const std::string& key, Parse parse) const {
+    try {
+      return parse();
+    } catch (const InputError& error) {
+      fail(node, key, error.what());
+    }
+  }
+
+  const toml::node* find(const std::string& key) {
+    known_.push_back(key);
+    return table_.get(key);
+  }
+
+  void number(const std::string& key, double low, double high, double& value) {
+    const toml::node* node = find(key);
+    if (!node) return;
+    const auto read = node->value<double>();
+    if (!node->is_number() || !(*read >= low) || !(*read <= high))
+      fail(*node, key, fmt::format("must be a number from {:g} to {:g}", low, high));
+    value = *read;
+  }
+
+  void integer(const std::string& key, std::int64_t low, std::int64_t high, auto& value) {
+    const toml::node* node = find(key);
+    if (!node) return;
+    const auto read = node->value<std::int64_t>();
+    if (!node->is_integer() || *read < low || *read > high)
+      fail(*node, key, fmt::format("must be a whole number from {} to {}", low, high));
+    value = static_cast<std::remove_reference_t<decltype(value)>>(*read);
+  }
+
+  void text(const std::string& key, std::string& value) {
+    const toml::node* node = find(key);
+    if (!node) return;
+    if (!node->is_string()) fail(*node, key, "must be a string");
+    value = *node->value<std::string>();
+  }
+
+  /// Calls visit(node) for the elements of a list, or for a single value.
+  void each(const std::string& key, const std::function<void(const toml::node&)>& visit) {
+    const toml::node* node = find(key);
+    if (!node) return;
+    const toml::array* array = node->as_array();
+    if (!array) return visit(*node);
+    if (array->empty()) fail(*node, key, "is an empty list");
+    for (const toml::node& element : *array) visit(element);
+  }
+
+  /// A list of strings (or one), each turned into a value by parse(string).
+  template <class Value, class Parse>
+  void strings(const std::string& key, std::vector<Value>& values, Parse parse) {
+    each(key, [&](const toml::node& node) {
+      if (!node.is_string()) fail(node, key, "must be a string or a list of strings");
+      values.push_back(located(node, key, [&] { return parse(*node.value<std::string>()); }));
+    });
+  }
+
+  void words(const std::string& key, const std::vector<std::string>& known, const std::string& fallback,
+             std::vector<std::string>& values) {
+    strings(key, values, [&](const std::string& word) {
+      if (std::find(known.begin(), known.end(), word) == known.end())
+        throw InputError(unknown_name("value", word, known));
+      return word;
+    });
+    if (values.empty()) values.push_back(fallback);
+  }
+
+  void reject_unknown_keys(const std::string& where) const {
+    for (const auto& [key, node] : table_)
+      if (const std::string name(key.str()); std::find(known_.begin(), known_.end(), name) == known_.end())
+        throw InputError(
+            {.file = file_, .line = static_cast<std::int64_t>(key.source().begin.line), .field = name},
+            unknown_name("key of " + where, name, known_));
+  }
+
+ private:
+  const toml::table& table_;
+  std::string file_;
+  std::vector<std::string> known_;
+};
+
+toml::table parse_toml(const std::string& text, const std::string& file) {
+  try {
+    return toml::parse(text, file);
+  } catch (const toml::parse_error& error) {
+    throw InputError({.file = file, .line = static_cast<std::int64_t>(error.source().begin.line)},
+                     std::string(error.description()));
+  }
+}
+
+void read_sampling(const toml::table& table, const std::string& file, SamplingPlan& sampling) {
+  TableReader reader(table, file);
+  reader.number("target", 1e-4, 1, sampling.target);
+  reader.integer("min_samples", 6, 100000, sampling.min_samples);
+  reader.integer("max_samples", 6, 100000, sampling.max_samples);
+  reader.number("point_seconds", 0.01, 1e6, sampling.point_seconds);
+  reader.number("time_limit", 0, 1e7, sampling.time_limit);
+  reader.integer("launches", 1, 100, sampling.launches);
+  reader.reject_unknown_keys("[sampling]");
+  if (sampling.max_samples < sampling.min_samples)
+    reader.fail(*table.get("max_samples"), "max_samples", "is below min_samples");
+}
+
+SceneReference relative_to(SceneReference scene, const std::filesystem::path& folder) {
+  const auto resolve = [&](std::string& path) {
+    if (path.empty() || !std::filesystem::path(path).has_extension()) return;
+    const auto beside = folder / path;
+    if (std::filesystem::exists(beside)) path = beside.string();
+  };
+  if (scene.model.find(':') == std::string::npos) resolve(scene.model);
+  resolve(scene.parameters);
+  return scene;
+}
+
+/// 1, 2, "max", "1..max": every count up to eight CPUs, then powers of two and the largest.
+std::vector<int> parse_threads(const std::string& text) {
+  const int max = available_cpus();
+  if (text == "max") return {max};
+  if (text != "1..max")
+    throw InputError(unknown_name("value", text, std::vector<std::string>{"max", "1..max"}));
+  std::vector<int> counts;
+  for (int n = 1; n < max; n = n < 8 ? n + 1 : n * 2) counts.push_back(n);
+  counts.push_back(max);
+  return counts;
+}
+
+std::vector<std::string> kernel_list(const std::string& word) {
+  std::vector<std::string> names;
+  for (const Kernel& kernel : kernels())
+    if (!kernel.info().hidden) names.emplace_back(kernel.info().name);
+  if (word == "all") return names;
+  find_kernel(word);
+  return {word};
+}
+
+/// An execution of the list, with chunks multiplied in where the schedule takes one and none is written.
+std::vector<ExecutionConfig> with_chunks(const ExecutionConfig& execution, const std::vector<int>& chunks) {
+  if (execution.chunk || chunks.empty() || is_left_out(execution.backend)) return {execution};
+  if (find_schedule(execution).chunk.empty()) return {execution};
+  std::vector<ExecutionConfig> all;
+  for (const int chunk : chunks) {
+    all.push_back(execution);
+    if (chunk > 0) all.back().chunk = chunk;
+  }
+  return all;
+}
+
+ExecutionConfig checked_execution(const std::string& text) {
+  const ExecutionConfig execution = parse_execution(text, "execution");
+  if (!is_left_out(execution.backend)) find_schedule(execution);
+  return execution;
+}
+
+Sweep read_sweep(const toml::table& table, const std::string& file, const std::filesystem::path& folder) {
+  Sweep sweep;
+  TableReader reader(table, file);
+  reader.each("scene", [&](const toml::node& node) {
+    if (!node.is_string())
+      reader.fail(node, "scene", "must be a string such as \"teapot\" or \"a.dat@a.txt\"");
+    sweep.scenes.push_back(relative_to(parse_scene_reference(*node.value<std::string>()), folder));
+  });
+  reader.strings("size", sweep.sizes, [](const std::string& s) { return parse_size(s, "size"); });
+  reader.each("kernel", [&](const toml::node& node) {
+    if (!node.is_string()) reader.fail(node, "kernel", "must be a string");
+    const auto names =
+        reader.located(node, "kernel", [&] { return kernel_list(*node.value<std::string>()); });
+    sweep.kernels.insert(sweep.kernels.end(), names.begin(), names.end());
+  });
+  std::vector<std::string> modes;
+  for (const ModeInfo& info : mode_infos()) modes.emplace_back(info.name);
+  reader.words("numeric", modes, "f32", sweep.numerics);
+  reader.strings("fill", sweep.fills, [](const std::string& s) { return parse_fill(s, "fill"); });
+  reader.strings("near", sweep.nears, [](const std::string& s) { return parse_near(s, "near"); });
+  std::vector<ExecutionConfig> executions;
+  reader.strings("execution", executions, checked_execution);
+  std::vector<int> chunks;
+  reader.each("chunk", [&](const toml::node& node) {
+    const auto value = node.value<std::int64_t>();
+    if (node.is_string() && *node.value<std::string>() == "default") return chunks.push_back(0);
+    if (!node.is_integer() || *value < 1 || *value > (1 << 30))
+      reader.fail(node, "chunk", "must be \"default\" or whole numbers from 1");
+    chunks.push_back(static_cast<int>(*value));
+  });
+  for (const ExecutionConfig& execution : executions)
+    for (const ExecutionConfig& one : with_chunks(execution, chunks)) sweep.executions.push_back(one);
+  reader.each("threads", [&](const toml::node& node) {
+    if (const auto value = node.value<std::int64_t>(); node.is_integer() && *value >= 1 && *value <= 65536)
+      return sweep.threads.push_back(static_cast<int>(*value));
+    if (!node.is_string())
+      reader.fail(node, "threads", "must be whole numbers from 1, \"max\" or \"1..max\"");
+    const auto counts =
+        reader.located(node, "threads", [&] { return parse_threads(*node.value<std::string>()); });
+    sweep.threads.insert(sweep.threads.end(), counts.begin(), counts.end());
+  });
+  std::vector<std::string> bindings, waits, runtimes;
+  reader.words("binding", kBindings, "none", bindings);
+  reader.words("wait_policy", kWaitPolicies, "default", waits);
+  reader.words("runtime", kRuntimes, "default", runtimes);
+  for (const auto& binding : bindings)
+    for (const auto& wait : waits)
+      for (const auto& runtime : runtimes) sweep.environments.push_back({binding, wait, runtime});
+  reader.each("tile", [&](const toml::node& node) {
+    const auto value = node.value<std::int64_t>();
+    if (!node.is_integer() || *value < 1 || *value > kMaxImageSide)
+      reader.fail(node, "tile", fmt::format("must be whole numbers of pixels from 1 to {}", kMaxImageSide));
+    sweep.tiles.push_back(static_cast<int>(*value));
+  });
+  reader.words("cache", kCaches, "warm", sweep.caches);
+  reader.reject_unknown_keys("[[sweep]]");
+
+  if (sweep.kernels.empty()) reader.fail(table, "kernel", "is missing from this [[sweep]]");
+  if (sweep.executions.empty()) reader.fail(table, "execution", "is missing from this [[sweep]]");
+  if (sweep.fills.empty()) sweep.fills.push_back(FillRule::kClosed);
+  if (sweep.nears.empty()) sweep.nears.push_back(NearRule::kClip);
+  if (sweep.threads.empty()) sweep.threads = {available_cpus()};
+  if (sweep.tiles.empty()) sweep.tiles.push_back(64);
+  return sweep;
+}
+
+}  // namespace
+
+Study read_study_file(const std::filesystem::path& path) {
+  Study study;
+  study.file = path.string();
+  std::ifstream file(path, std::ios::binary);
+  if (!file || std::filesystem::is_directory(path)) {
+    std::vector<std::string> known;
+    for (const auto& study_file : known_studies()) known.push_back(study_file.string());
+    throw InputError({.file = study.file},
+                     known.empty() ? "no such study file" : unknown_name("study", study.file, known));
+  }
+  study.text.assign(std::istreambuf_iterator<char>(file), {});
+  const toml::table table = parse_toml(study.text, study.file);
+  TableReader reader(table, study.file);
+  study.name = path.stem().string();
+  reader.text("name", study.name);
+  reader.text("question", study.question);
+  reader.integer("seed", 0, std::numeric_limits<std::int64_t>::max(), study.seed);
+  if (const toml::node* node = reader.find("sampling")) {
+    if (!node->is_table()) reader.fail(*node, "sampling", "must be a table");
+    read_sampling(*node->as_table(), study.file, study.sampling);
+  }
+  reader.find("sweep");
+  reader.reject_unknown_keys("a study");
+  return study;
+}
+
+std::vector<Sweep> read_sweeps(const std::filesystem::path& path, const std::string& text,
+                               const std::vector<std::string>& scenes,
+                               const std::vector<std::string>& sizes) {
+  const std::string file = path.string();
+  const toml::table table = parse_toml(text, file);
+  const toml::array* sweeps = table.get_as<toml::array>("sweep");
+  if (!sweeps || sweeps->empty())
+    throw InputError({.file = file, .field = "sweep"}, "a study needs at least one [[sweep]]");
+  std::vector<Sweep> all;
+  for (const toml::node& node : *sweeps) {
+    if (!node.is_table()) throw InputError({.file = file, .field = "sweep"}, "must be [[sweep]] tables");
+    Sweep sweep = read_sweep(*node.as_table(), file, path.parent_path());
+    if (!scenes.empty()) {
+      sweep.scenes.clear();
+      for (const std::string& scene : scenes) sweep.scenes.push_back(parse_scene_reference(scene));
+    }
+    if (!sizes.empty()) {
+      sweep.sizes.clear();
+      for (const std::string& size : sizes) sweep.sizes.push_back(parse_size(size, "--size"));
+    }
+    if (sweep.scenes.empty())
+      throw InputError(
+          {.file = file, .line = static_cast<std::int64_t>(node.source().begin.line), .field = "scene"},
+          "is missing from this [[sweep]]");
+    all.push_back(std::move(sweep));
+  }
+  return all;
+}
+
+void span_points(const Sweep& sweep, const std::map<std::string, Scene>& scenes,
+                 const std::function<void(const Point&)>& visit) {
+  for (const SceneReference& scene : sweep.scenes) {
+    std::vector<std::pair<int, int>> sizes = sweep.sizes;
+    const SceneParameters& own = scenes.at(scene.name).parameters;
+    if (sizes.empty()) sizes.emplace_back(own.width, own.height);
+    for (const auto& [width, height] : sizes)
+      for (const std::string& numeric : sweep.numerics)
+        for (const FillRule fill : sweep.fills)
+          for (const NearRule near_rule : sweep.nears)
+            for (const std::string& kernel : sweep.kernels)
+              for (const int tile : find_kernel(kernel).info().has_tiles ? sweep.tiles : std::vector<int>{64})
+                for (const ExecutionConfig& execution : sweep.executions)
+                  for (const int threads :
+                       execution.backend == "serial" ? std::vector<int>{1} : sweep.threads)
+                    for (const Environment& environment : sweep.environments)
+                      for (const std::string& cache : sweep.caches) {
+                        Point point{scene,     width,     height,      kernel, numeric, fill,
+                                    near_rule, execution, environment, tile,   cache};
+                        point.execution.threads = threads;
+                        visit(point);
+                      }
+  }
+}
+
+}  // namespace rasterbench

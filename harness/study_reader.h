@@ -1,0 +1,40 @@
+// The TOML side of studies: keys, values and their errors.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "harness/study.h"
+
+namespace rasterbench {
+
+/// One [[sweep]]: the values of each axis.
+struct Sweep {
+  std::vector<SceneReference> scenes;
+  std::vector<std::pair<int, int>> sizes;  ///< empty: each scene's own
+  std::vector<std::string> kernels;
+  std::vector<std::string> numerics;
+  std::vector<FillRule> fills;
+  std::vector<NearRule> nears;
+  std::vector<ExecutionConfig> executions;  ///< threads not yet set
+  std::vector<int> threads;
+  std::vector<Environment> environments;
+  std::vector<int> tiles;
+  std::vector<std::string> caches;
+};
+
+/// Name, question, seed and [sampling] of a study file, and its text; no points yet.
+Study read_study_file(const std::filesystem::path& file);
+
+/// The [[sweep]] tables of `text`. Scenes and sizes, if not empty, replace those of every sweep.
+std::vector<Sweep> read_sweeps(const std::filesystem::path& file, const std::string& text,
+                               const std::vector<std::string>& scenes, const std::vector<std::string>& sizes);
+
+/// Calls `visit` for every combination of a sweep. An axis that does not apply to a point is not multiplied:
+/// serial has one thread, and kernels without tiles one tile size.
+void span_points(const Sweep& sweep, const std::map<std::string, Scene>& scenes,
+                 const std::function<void(const Point&)>& visit);
+
+}  // namespace rasterbench

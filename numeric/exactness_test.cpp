@@ -1,0 +1,191 @@
+// Coverage against exact integers, its bound, and its monotony along rows.
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "numeric/coverage_testing.h"
+#include "scene/generator.h"
+
+namespace rasterbench {
+namespace {
+
+template <class Mode>
+class Exactness : public testing::Test {};
+TYPED_TEST_SUITE(Exactness, ModeTypes, ModeNames);
+
+TYPED_TEST(Exactness, OnAGridOfQuartersEveryModeIsExact) {
+  constexpr int kUnit = 4;  // per pixel: every mode holds and multiplies such coordinates without rounding
+  Random random(11);
+  int on_an_edge = 0;
+  for (int i = 0; i < 3000; ++i) {
+    const bool on_halves = i % 2 == 0;  // centres lie on corners and edges often
+    const auto coordinate = [&] {
+      const auto c = static_cast<std::int64_t>(random.bits() % 97) - 16;
+      return on_halves ? c / 2 * 2 : c;
+    };
+    IntTriangle t;
+    for (IntPoint& p : t) p = {coordinate(), coordinate()};
+    const auto pixels = [](const IntPoint& p) {
+      return Point{static_cast<double>(p.x) / kUnit, static_cast<double>(p.y) / kUnit};
+    };
+    for (const FillRule fill : kFillRules) {
+      const auto prepared = prepare<TypeParam>(pixels(t[0]), pixels(t[1]), pixels(t[2]), fill);
+      // The whole image, so that a box that is too small shows.
+      for (int y = 0; y < 16; ++y)
+        for (int x = 0; x < 16; ++x) {
+          const IntPoint sample{x * kUnit + kUnit / 2, y * kUnit + kUnit / 2};
+          ASSERT_EQ(covers<TypeParam>(prepared, x, y), exactly_covers(t, sample, fill))
+              << "triangle " << i << " at " << x << "," << y;
+          on_an_edge += fill == FillRule::kTopLeft && exactly_covers(t, sample, FillRule::kClosed) &&
+                        !exactly_covers(t, sample, FillRule::kTopLeft);
+        }
+    }
+  }
+  EXPECT_GT(on_an_edge, 500);  // else the grid does not ask what it is here to ask
+}
+
+/// A long thin triangle whose corners are float32 numbers in [1, extent].
+std::array<Point, 3> random_sliver(Random& random, double extent) {
+  const auto coordinate = [&](double v) {
+    return static_cast<double>(static_cast<float>(std::clamp(v, 1.0, extent)));
+  };
+  const auto anywhere = [&] { return coordinate(random.uniform(1, extent)); };
+  const Point a{anywhere(), anywhere(), random.uniform(-1, 1)},
+      b{anywhere(), anywhere(), random.uniform(-1, 1)};
+  const double t = random.uniform(), width = std::pow(10.0, random.uniform(-4, 1));
+  return {a,
+          b,
+          {coordinate(a.x + t * (b.x - a.x) + random.uniform(-width, width)),
+           coordinate(a.y + t * (b.y - a.y) + random.uniform(-width, width)), random.uniform(-1, 1)}};
+}
+
+TYPED_TEST(Exactness, ErrsOnlyWithinItsBoundOfAnEdge) {
+  constexpr double kUnit = 0x1p23;  // float32 numbers >= 1 are integers in this unit
+  const ModeBound& bound = TypeParam::kInfo.numbers;
+  const auto exact = [](const Point& p) {
+    return IntPoint{static_cast<std::int64_t>(p.x * kUnit), static_cast<std::int64_t>(p.y * kUnit)};
+  };
+  Random random(12);
+  std::int64_t tested = 0, wrong = 0, covered = 0;
+  for (const double extent : {64.0, 4096.0, 65536.0, 131072.0})
+    for (int i = 0; i < 200; ++i) {
+      const auto corners = random_sliver(random, extent);
+      const IntTriangle t{exact(corners[0]), exact(corners[1]), exact(corners[2])};
+      const auto prepared = prepare<TypeParam>(corners[0], corners[1], corners[2], FillRule::kClosed);
+      // 4 u X where edges round, the half diagonal of a snap in fixed point.
+      const long double allowed =
+          (4 * bound.edge_unit * extent + std::numbers::sqrt2 * bound.snap * (1 + 1e-9)) * kUnit;
+      for (int k = 0; k < 100; ++k) {
+        // Pixels along an edge, where the sign is uncertain.
+        const auto e = static_cast<std::size_t>(k % 3);
+        const Point &a = corners[e], &b = corners[(e + 1) % 3];
+        const double s = random.uniform();
+        const int x = static_cast<int>(a.x + s * (b.x - a.x)), y = static_cast<int>(a.y + s * (b.y - a.y));
+        const IntPoint sample{static_cast<std::int64_t>((x + 0.5) * kUnit),
+                              static_cast<std::int64_t>((y + 0.5) * kUnit)};
+        ++tested;
+        const bool truth = exactly_covers(t, sample, FillRule::kClosed);
+        covered += truth;
+        if (covers<TypeParam>(prepared, x, y) == truth) continue;
+        ++wrong;
+        long double distance = distance_to_line(t[0], t[1], sample);
+        distance = std::min(distance, distance_to_line(t[1], t[2], sample));
+        distance = std::min(distance, distance_to_line(t[2], t[0], sample));
+        ASSERT_LE(distance, allowed) << "extent " << extent << ", triangle " << i << " at " << x << "," << y
+                                     << ": " << static_cast<double>(distance / kUnit) << " px";
+      }
+    }
+  EXPECT_GT(covered, tested / 10);
+  // The bound of the float32 mode is needed; double has none of these wrong.
+  if (bound.vertex_unit == 0x1p-53) {
+    EXPECT_EQ(wrong, 0);
+  } else {
+    EXPECT_GT(wrong, 0);
+  }
+}
+
+/// How often the answer of edge `e` changes along pixels first <= x < last of a row.
+template <class Mode>
+int changes_along_row(const typename Mode::Prepared& prepared, int e, int y, int first, int last) {
+  int changes = 0;
+  bool before = Mode::inside_edge(prepared, e, first, y);
+  for (int x = first + 1; x < last; ++x) {
+    const bool now = Mode::inside_edge(prepared, e, x, y);
+    changes += now != before;
+    before = now;
+  }
+  return changes;
+}
+
+TYPED_TEST(Exactness, EachEdgeIsAHalfLineAlongARow) {
+  Random random(13);
+  int changed = 0;
+  for (const double extent : {64.0, 2000.0, 65536.0, 131072.0})
+    for (int i = 0; i < 100; ++i) {
+      auto corners = random_sliver(random, extent);
+      if (i % 2 == 0) {
+        // An edge that hardly rises and runs along a row of centres: many pixels with an uncertain sign.
+        const double y = std::floor(corners[0].y) + 0.5;
+        const double slope = std::pow(10.0, random.uniform(-9, -2));
+        corners[0].y = y - slope * random.uniform() * std::abs(corners[1].x - corners[0].x);
+        corners[1].y = y + slope * random.uniform() * std::abs(corners[1].x - corners[0].x);
+        if (i % 4 == 0) corners[0].x -= extent;  // the guard band has two sides
+      }
+      for (const FillRule fill : kFillRules) {
+        const auto prepared = prepare<TypeParam>(corners[0], corners[1], corners[2], fill);
+        for (int k = 0; k < 3; ++k) {
+          const double s = random.uniform();
+          const int x = static_cast<int>(corners[0].x + s * (corners[1].x - corners[0].x));
+          const int y = static_cast<int>(corners[0].y + s * (corners[1].y - corners[0].y));
+          for (int e = 0; e < 3; ++e) {
+            const int changes = changes_along_row<TypeParam>(prepared, e, y, x - 300, x + 300);
+            ASSERT_LE(changes, 1) << "extent " << extent << ", triangle " << i << ", edge " << e << ", row "
+                                  << y;
+            changed += changes;
+          }
+        }
+      }
+    }
+  EXPECT_GT(changed, 1000);  // the rows do cross edges
+}
+
+TYPED_TEST(Exactness, TheOrderOfTheCornersDoesNotMatter) {
+  constexpr int kOrders[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}, {1, 0, 2}, {0, 2, 1}};
+  Random random(14);
+  int covered = 0;
+  for (int i = 0; i < 300; ++i) {
+    std::array<Point, 3> p;
+    if (i % 3 == 0) {
+      p = random_sliver(random, 40);
+    } else {
+      for (Point& corner : p)
+        corner = {random.uniform(-8, 48), random.uniform(-8, 48), random.uniform(-1, 1)};
+      if (i % 3 == 1) p[1].x = p[0].x;  // the order of the corners is decided by y
+    }
+    for (const FillRule fill : kFillRules) {
+      const auto first = prepare<TypeParam>(p[0], p[1], p[2], fill);
+      for (const auto& order : kOrders) {
+        const auto other =
+            prepare<TypeParam>(p[static_cast<std::size_t>(order[0])], p[static_cast<std::size_t>(order[1])],
+                               p[static_cast<std::size_t>(order[2])], fill);
+        for (int y = 0; y < 40; ++y)
+          for (int x = 0; x < 40; ++x) {
+            ASSERT_EQ(covers<TypeParam>(other, x, y), covers<TypeParam>(first, x, y)) << i;
+            if (!covers<TypeParam>(first, x, y)) continue;
+            ++covered;
+            ASSERT_EQ(encode(TypeParam::depth(other, x, y)), encode(TypeParam::depth(first, x, y))) << i;
+          }
+      }
+    }
+  }
+  EXPECT_GT(covered, 10000);
+}
+
+TYPED_TEST(Exactness, TheExtensionOfAnEdgeIsOutside) {
+  // Two products accept the whole line AB (accuracy.md, section 1): here centres lie on its extension.
+  const auto prepared = prepare<TypeParam>({3.5, 3.5}, {6.5, 3.5}, {5, 7}, FillRule::kClosed);
+  for (int x = 0; x < 12; ++x) EXPECT_EQ(covers<TypeParam>(prepared, x, 3), x >= 3 && x <= 6) << x;
+}
+
+}  // namespace
+}  // namespace rasterbench
