@@ -109,6 +109,10 @@ class Study:
         return pd.DataFrame(rows)
 
 
+def is_whole(value: object) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and value > 0
+
+
 def load(directory: Path) -> Study:
     directory = Path(directory)
     if not directory.is_dir():
@@ -246,12 +250,11 @@ class _Reader:
             if key not in config:
                 raise self.fail(f"config.{key}", "missing")
         size, threads, chunk = config["size"], config["threads"], config["chunk"]
-        whole = lambda x: isinstance(x, int) and not isinstance(x, bool) and x > 0
-        if not (isinstance(size, list) and len(size) == 2 and all(map(whole, size))):
+        if not (isinstance(size, list) and len(size) == 2 and all(map(is_whole, size))):
             raise self.fail("config.size", f"expected [width, height], found {size!r}")
-        if not whole(threads):
+        if not is_whole(threads):
             raise self.fail("config.threads", f"expected a whole number above 0, found {threads!r}")
-        if chunk is not None and not whole(chunk):
+        if chunk is not None and not is_whole(chunk):
             raise self.fail("config.chunk", f"expected a whole number above 0 or null, found {chunk!r}")
         if config["schedule"] is not None:
             self.text(config, "schedule", "config.")

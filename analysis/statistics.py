@@ -69,12 +69,12 @@ class Estimate:
         return self.has_interval and (self.low > 1.0 or self.high < 1.0)
 
     def scaled(self, factor: float) -> Estimate:
-        scale = lambda x: None if x is None else x * factor
-        return replace(self, value=self.value * factor, low=scale(self.low), high=scale(self.high))
+        low, high = (None if bound is None else bound * factor for bound in (self.low, self.high))
+        return replace(self, value=self.value * factor, low=low, high=high)
 
     def inverse(self) -> Estimate:
-        turn = lambda x: None if x is None else 1.0 / x
-        return replace(self, value=1.0 / self.value, low=turn(self.high), high=turn(self.low))
+        low, high = (None if bound is None else 1.0 / bound for bound in (self.high, self.low))
+        return replace(self, value=1.0 / self.value, low=low, high=high)
 
 
 @dataclass(frozen=True)

@@ -5,14 +5,11 @@ from __future__ import annotations
 import io
 from dataclasses import dataclass
 
-import matplotlib
-
-matplotlib.use("Agg")  # figures are files; a display is never needed
-
-import matplotlib.pyplot as plt  # noqa: E402
-from matplotlib.axes import Axes  # noqa: E402
-from matplotlib.figure import Figure  # noqa: E402
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator  # noqa: E402
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
+from matplotlib.textpath import TextPath
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
 FULL_WIDTH = 6.9  # inches: the text width of an A4 page
 MAX_HEIGHT = 9.0  # with its caption it still fits on that page
@@ -51,7 +48,8 @@ def look(index: int) -> Look:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    return plt.figure(figsize=(width, height))
+    # Not through pyplot: no display, no list of open figures, nothing to close.
+    return Figure(figsize=(width, height))
 
 
 def place(figure: Figure, left: float, bottom: float, width: float, height: float, **options) -> Axes:
@@ -62,9 +60,6 @@ def place(figure: Figure, left: float, bottom: float, width: float, height: floa
 
 def text_width(texts: list[str], size: float, bold: bool = False) -> float:
     """Width in inches of the widest text."""
-    from matplotlib.font_manager import FontProperties
-    from matplotlib.textpath import TextPath
-
     font = FontProperties(family="DejaVu Sans", weight="bold" if bold else "normal")
     widest = max(texts, key=len, default="")
     candidates = {t for t in texts if len(t) > 0.8 * len(widest)}
@@ -100,11 +95,10 @@ def number_axis(axes: Axes, low: float, high: float, log: bool, name: str = "x")
 
 
 def outputs(figure: Figure) -> dict[str, bytes]:
-    """The figure as svg, pdf and png, then closed."""
+    """The figure as svg, pdf and png."""
     files = {}
     for kind, metadata in (("svg", {"Date": None}), ("pdf", {"CreationDate": None}), ("png", {})):
         buffer = io.BytesIO()
         figure.savefig(buffer, format=kind, dpi=PNG_DPI, metadata=metadata)
         files[kind] = buffer.getvalue()
-    plt.close(figure)
     return files

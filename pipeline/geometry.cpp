@@ -47,9 +47,12 @@ bool has_zero_area(const Triangle& t) {
   return uy * vz == uz * vy && uz * vx == ux * vz && ux * vy == uy * vx;
 }
 
+/// As a weighted sum, not a + t (b - a): that loses what the outside corner says where the inside one is much
+/// farther away.
 Corner interpolate(const Corner& inside, const Corner& outside, double at_inside, double at_outside) {
-  const double t = at_inside / (at_inside - at_outside);
-  const auto mix = [t](double a, double b) { return a + t * (b - a); };
+  const double of_inside = at_outside / (at_outside - at_inside),
+               of_outside = at_inside / (at_inside - at_outside);
+  const auto mix = [=](double a, double b) { return of_inside * a + of_outside * b; };
   return {mix(inside.x, outside.x), mix(inside.y, outside.y), mix(inside.z, outside.z),
           mix(inside.w, outside.w), mix(inside.near_distance, outside.near_distance)};
 }
@@ -73,10 +76,11 @@ Polygon cut(const Polygon& polygon, Distance distance, OnPlane on_plane) {
   return kept;
 }
 
-Polygon cut_at_near(const Polygon& polygon) {
+Polygon cut_at_near(const Polygon& polygon, double near_w) {
   return cut(
       polygon, [](const Corner& c) { return c.near_distance; },
-      [](Corner& c) {
+      [near_w](Corner& c) {
+        if (near_w > 0) c.w = near_w;  // between two huge corners rounding would leave nothing of it
         c.near_distance = 0;
         c.z = -c.w;  // d = -1 exactly
       });
@@ -120,10 +124,16 @@ ScreenPolygon project(const Polygon& polygon) {
   return screen;
 }
 
-/// Twice the signed area of the first three corners' triangle; negative for front faces, since y points down.
+/// Twice the signed area; negative for front faces, since y points down. Of the whole polygon: a corner that
+/// lies on a plane that cuts it is there twice, so that its first three may have none.
 double signed_area2(const ScreenPolygon& p) {
-  const ScreenPoint &a = p.points[0], &b = p.points[1], &c = p.points[2];
-  return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+  const ScreenPoint& a = p.points[0];
+  double sum = 0;
+  for (std::size_t i = 2; i < static_cast<std::size_t>(p.size); ++i) {
+    const ScreenPoint &b = p.points[i - 1], &c = p.points[i];
+    sum += (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+  }
+  return sum;
 }
 
 template <class Real>
@@ -149,7 +159,7 @@ bool to_screen(const Triangle& triangle, const ScreenTransform& transform, const
 
   bool near_clipped = false, guard_clipped = false;
   if (options.near_rule == NearRule::kClip && any([](const Corner& c) { return c.near_distance < 0; })) {
-    polygon = cut_at_near(polygon);
+    polygon = cut_at_near(polygon, transform.near_w);
     near_clipped = true;
   }
   // Without the clip a corner at w <= 0 has no place on the screen; with it, only rounding can leave one.
@@ -197,6 +207,7 @@ ScreenTransform make_screen_transform(const Camera& camera) {
           camera.z,
           camera.w,
           camera.near_distance,
+          camera.near_w,
           width,
           height};
 }

@@ -16,6 +16,7 @@ namespace rasterbench {
 /// points to (x w, y w, z, w), x and y in pixels, and the distance in front of the near plane.
 struct ScreenTransform {
   AffineRow x, y, z, w, near_distance;
+  double near_w;         ///< Camera::near_w
   double width, height;  ///< of the image in pixels
 };
 ScreenTransform make_screen_transform(const Camera& camera);

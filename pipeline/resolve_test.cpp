@@ -1,1 +1,146 @@
+// The resolve stage: flat shading, and keys into colours and depths.
+#include "pipeline/resolve.h"
+
 #include <gtest/gtest.h>
+
+#include <array>
+#include <vector>
+
+#include "numeric/modes.h"
+
+namespace rasterbench {
+namespace {
+
+constexpr std::uint32_t rgba(std::uint32_t r, std::uint32_t g, std::uint32_t b) {
+  return r | g << 8 | b << 16 | 255u << 24;
+}
+
+Triangle scaled(const Triangle& t, float factor) {
+  const auto s = [factor](const Vec3& p) { return Vec3{p.x * factor, p.y * factor, p.z * factor}; };
+  return {s(t.a), s(t.b), s(t.c)};
+}
+
+Triangle reversed(const Triangle& t) { return {t.c, t.b, t.a}; }
+
+// Unit triangles whose normals (b - a) x (c - a) point along +x, +y and +z.
+const Triangle kTowardsX{{0, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+const Triangle kTowardsY{{0, 0, 0}, {0, 0, 1}, {1, 0, 0}};
+const Triangle kTowardsZ{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+
+TEST(PackRgba, RedIsTheLowestByte) {
+  EXPECT_EQ(pack_rgba({1, 2, 3}), 0xff030201u);
+  EXPECT_EQ(pack_rgba({255, 0, 128}), rgba(255, 0, 128));
+}
+
+TEST(ShadeFlat, AxisAlignedFacesHaveOneOverRootThree) {
+  // s = 1/sqrt(3) = 0.577350...: 255 s = 147.22, 200 s = 115.47, 76 s = 43.88, truncated to 43.
+  for (const Triangle& t : {kTowardsX, kTowardsY, kTowardsZ})
+    EXPECT_EQ(shade_flat(t, {255, 200, 76}), rgba(147, 115, 43));
+}
+
+TEST(ShadeFlat, BackFacesAreBlackAndOpaque) {
+  for (const Triangle& t : {kTowardsX, kTowardsY, kTowardsZ})
+    EXPECT_EQ(shade_flat(reversed(t), {255, 200, 76}), rgba(0, 0, 0));
+}
+
+TEST(ShadeFlat, TruncatesAndDoesNotRound) {
+  // The normal (2, 1, 2)/3: s = 5/(3 sqrt(3)) = 0.9622504. 250 s = 240.56, 110 s = 105.85, 1 s = 0.96.
+  const Triangle t{{0, 0, 0}, {1, 0, -1}, {0, 2, -1}};  // (1, 0, -1) x (0, 2, -1) = (2, 1, 2)
+  EXPECT_EQ(shade_flat(t, {250, 110, 1}), rgba(240, 105, 0));
+}
+
+TEST(ShadeFlat, FullLightDoesNotOverflowAChannel) {
+  // The normal (1, 1, 1)/sqrt(3) faces the light: s = 1, which rounding may exceed.
+  const Triangle t{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  const std::uint32_t colour = shade_flat(t, {255, 255, 255});
+  EXPECT_GE(colour & 0xffu, 254u);  // 0 if 255.0000001 had wrapped
+  EXPECT_EQ(colour >> 8 & 0xffu, colour & 0xffu);
+}
+
+TEST(ShadeFlat, DoesNotDependOnTheSize) {
+  const Triangle unit{{0, 0, 0}, {1, 0, -1}, {0, 2, -1}};
+  const Rgb white{250, 110, 40};
+  for (const Triangle& t : {unit, kTowardsX, reversed(kTowardsY)})
+    // Powers of two are exact; 1e30 squared is no float32, and 1e-30 squared is zero.
+    for (const float factor : {0x1p100f, 0x1p-100f, 0x1p-140f, 1e30f, 1e-30f})
+      EXPECT_EQ(shade_flat(scaled(t, factor), white), shade_flat(t, white)) << factor;
+}
+
+TEST(ShadeFlat, DoesNotDependOnThePlace) {
+  const Triangle t{{1000, -2000, 4000}, {1001, -2000, 3999}, {1000, -1998, 3999}};
+  EXPECT_EQ(shade_flat(t, {250, 110, 40}), rgba(240, 105, 38));  // as the unit one at the origin
+}
+
+template <class Mode>
+class ResolveRow : public testing::Test {
+ protected:
+  /// Triangles 0, 1, 2 are lit 1/sqrt(3), not lit, and lit by 0.96.
+  static Scene scene() {
+    Scene scene;
+    scene.model.triangles = {kTowardsX, reversed(kTowardsX), {{0, 0, 0}, {1, 0, -1}, {0, 2, -1}}};
+    scene.parameters.object = {250, 110, 40};
+    scene.parameters.background = {10, 20, 30};
+    return scene;
+  }
+  static constexpr std::uint32_t kBackground = rgba(10, 20, 30);
+  static constexpr std::uint32_t kOf[3] = {rgba(144, 63, 23), rgba(0, 0, 0), rgba(240, 105, 38)};
+};
+using Modes = testing::Types<F32, F64, Fixed8>;
+TYPED_TEST_SUITE(ResolveRow, Modes);
+
+TYPED_TEST(ResolveRow, MapsKeysToColoursAndDepths) {
+  const auto clear = TypeParam::kClear;
+  const auto key = [](float depth, std::uint32_t rank) { return TypeParam::key(depth, rank); };
+  // Runs of one triangle, changes between triangles, and to and from the background.
+  const std::vector keys{clear, key(-1, 0), key(0.25f, 0), key(0.5f, 1),
+                         clear, clear,      key(0.75f, 2), key(0.5f, 0)};
+  const int width = static_cast<int>(keys.size());
+  const auto b = TestFixture::kBackground;
+  const auto& of = TestFixture::kOf;
+  const Scene scene = TestFixture::scene();
+  const std::vector<float> depths{1, -1, 0.25f, 0.5f, 1, 1, 0.75f, 0.5f};
+
+  std::vector<std::uint32_t> colours(keys.size());
+  std::vector<float> got_depths(keys.size(), -7.0f);
+  resolve_row<TypeParam>(keys.data(), width, scene, TieRule::kFirst, colours.data(), got_depths.data());
+  EXPECT_EQ(colours, (std::vector<std::uint32_t>{b, of[0], of[0], of[1], b, b, of[2], of[0]}));
+  EXPECT_EQ(got_depths, depths);
+
+  // The later triangle wins ties: rank r is triangle 2 - r.
+  resolve_row<TypeParam>(keys.data(), width, scene, TieRule::kLast, colours.data(), got_depths.data());
+  EXPECT_EQ(colours, (std::vector<std::uint32_t>{b, of[2], of[2], of[1], b, b, of[0], of[2]}));
+  EXPECT_EQ(got_depths, depths);
+}
+
+TYPED_TEST(ResolveRow, WritesNoMoreThanItsRow) {
+  const std::array keys{TypeParam::key(0, 1), TypeParam::key(0, 1)};
+  std::array<std::uint32_t, 2> colours{7, 7};
+  std::array<float, 2> depths{7, 7};
+  resolve_row<TypeParam>(keys.data(), 1, TestFixture::scene(), TieRule::kFirst, colours.data(),
+                         depths.data());
+  EXPECT_EQ(colours, (std::array<std::uint32_t, 2>{rgba(0, 0, 0), 7}));
+  EXPECT_EQ(depths, (std::array<float, 2>{0, 7}));
+}
+
+TYPED_TEST(ResolveRow, ASceneWithoutTrianglesIsBackground) {
+  Scene empty = TestFixture::scene();
+  empty.model.triangles.clear();
+  const std::array keys{TypeParam::kClear, TypeParam::kClear};
+  for (const TieRule tie : {TieRule::kFirst, TieRule::kLast}) {
+    std::array<std::uint32_t, 2> colours{};
+    std::array<float, 2> depths{};
+    resolve_row<TypeParam>(keys.data(), 2, empty, tie, colours.data(), depths.data());
+    EXPECT_EQ(colours, (std::array{TestFixture::kBackground, TestFixture::kBackground}));
+    EXPECT_EQ(depths, (std::array{1.0f, 1.0f}));
+  }
+}
+
+TEST(SwapRank, IsItsOwnInverse) {
+  EXPECT_EQ(swap_rank(TieRule::kFirst, 10, 3), 3u);
+  EXPECT_EQ(swap_rank(TieRule::kLast, 10, 3), 6u);
+  EXPECT_EQ(swap_rank(TieRule::kLast, 10, 0), 9u);
+  EXPECT_EQ(swap_rank(TieRule::kLast, kMaxTriangles, swap_rank(TieRule::kLast, kMaxTriangles, 5)), 5u);
+}
+
+}  // namespace
+}  // namespace rasterbench

@@ -1,9 +1,9 @@
 // Where and how deep a kernel may draw a triangle if its screen vertices, edge functions and depths carry no
-// more than the rounding errors of its numeric mode, and the comparison of pictures built on that.
+// more than the rounding errors of its numeric mode.
 //
 // Error bounds as in: Nicholas J. Higham, Accuracy and Stability of Numerical Algorithms, SIAM 2002,
-// section 3.1: n roundings of unit u change a result by a factor within 1 +- gamma_n, gamma_n = n u / (1 - n
-// u).
+// section 3.1. With unit roundoff u, n roundings change a result by a factor within 1 +- gamma_n, where
+// gamma_n = n u / (1 - n u).
 //
 // The model of a kernel: clip coordinates in double; clip at the near plane and at the guard band; project;
 // round the vertices (vertex_unit), snap; fan into pieces; bounding box and edge functions (b-a)x(p-a)

@@ -48,6 +48,7 @@ Camera look_at_origin(const Vec3d& position, double theta, double near_plane, do
   camera.w = scaled(view.w, -1, view.distance);
   camera.near_distance = scaled(view.w, -1, view.distance - near_plane);
   camera.viewport = viewport;
+  camera.near_w = near_plane;
   return camera;
 }
 
@@ -65,6 +66,7 @@ Camera orthographic_at_origin(const Vec3d& position, double half_height, double 
   camera.w = {0, 0, 0, 1};
   camera.near_distance = scaled(view.w, -1, view.distance - near_plane);
   camera.viewport = viewport;
+  camera.near_w = 1;
   return camera;
 }
 

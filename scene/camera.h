@@ -40,6 +40,7 @@ struct Camera {
   AffineRow x, y, z, w;
   AffineRow near_distance;
   Viewport viewport;
+  double near_w = 0;  ///< w of every point on the near plane, where it is the same for all; 0 where it is not
 };
 
 /// The camera of the course contract (INFO0939): at `position`, looking at the origin, y up, perspective.

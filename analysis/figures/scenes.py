@@ -34,6 +34,7 @@ def draw(analysis: Analysis) -> Iterator[Drawing]:
         row, column = divmod(i, columns)
         axes = style.place(figure, gap + column * (width + gap), total - (row + 1) * (height + label + gap), width, height)
         axes.imshow(image, interpolation="nearest", cmap="gray", vmin=0, vmax=1 if image.dtype.kind == "f" else 255)
+        axes.set_anchor("NW")  # pictures of several shapes keep their titles on one line
         axes.set_xticks([])
         axes.set_yticks([])
         for spine in axes.spines.values():
