@@ -146,12 +146,11 @@ def _threads(analysis: Analysis) -> Iterator[Warn]:
 
 def _families(analysis: Analysis) -> Iterator[Warn]:
     """Many comparisons with few samples: no rank test can be significant after the correction, whatever the times."""
-    for group in analysis.groups:
-        assumed = [c for c in group.comparisons.values() if c.test == statistics.WELCH]
-        if assumed:
-            yield Warn(NOTE, f"{group.title}: for {len(assumed)} of {text.count(len(group.timed) - 1, 'comparison')} with the fastest the"
-                       " samples are too few for a rank test after correction; Welch's t test on logarithms stands in, which"
-                       " assumes a distribution.")
+    assumed = [c for group in analysis.groups for c in group.comparisons.values() if c.test == statistics.WELCH]
+    if assumed:
+        most = max(len(group.timed) - 1 for group in analysis.groups)
+        yield Warn(NOTE, f"too few samples for a rank test among up to {text.count(most, 'comparison')}: {len(assumed)} comparisons with the"
+                   " fastest of a scene use Welch's t test on logarithms instead, which assumes a distribution.")
 
 
 def _agreement(analysis: Analysis) -> Iterator[Warn]:

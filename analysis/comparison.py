@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -16,7 +17,7 @@ EXTRA_AXES = ("isa", "tile", "binding", "wait_policy", "runtime")
 BASE_AXES = ("scene", "scene_hash", "size", "numeric", "fill", "near", "isa", "output", "cache")
 
 
-@dataclass
+@dataclass(eq=False)
 class Group:
     """The points of one picture in one arithmetic."""
 
@@ -25,6 +26,7 @@ class Group:
     records: list[Record]
     best: Record | None = None
     comparisons: dict[str, Comparison] = field(default_factory=dict)
+    slug: str = ""  # for file names; no two groups have the same
 
     @property
     def timed(self) -> list[Record]:
@@ -39,8 +41,9 @@ class Group:
         return list(dict.fromkeys(record.config.kernel for record in self.records))
 
     @property
-    def slug(self) -> str:
-        return slug(self.title)
+    def family_slug(self) -> str:
+        config = self.records[0].config
+        return slug(f"{config.scene} {config.size[0]}x{config.size[1]}")
 
 
 @dataclass(frozen=True)
@@ -57,7 +60,12 @@ class Panel:
 def slug(title: str) -> str:
     """A title as a file name."""
     words = "".join(c.lower() if c.isalnum() and c.isascii() else " " for c in title).split()
-    return "_".join(words)[:60]
+    name = "_".join(words)
+    if len(name) <= 64:
+        return name
+    # A long name keeps both ends, because size and numeric mode stand last; a digest tells it from its like.
+    digest = hashlib.sha256(title.encode()).hexdigest()[:6]
+    return f"{name[:30].rpartition('_')[0]}_{digest}_{name[-26:].partition('_')[2]}"
 
 
 def execution(config: Config) -> str:
@@ -143,6 +151,9 @@ class Analysis:
             said = {"scene", "size", "numeric"}
             title += "".join(f" {getattr(config, axis)}" for axis in varying if axis not in said)
             groups.append(self._compared(Group(key, title, records), families))
+        for group in groups:
+            same = [other for other in groups if slug(other.title) == slug(group.title)]
+            group.slug = slug(group.title) + (f"_{same.index(group) + 1}" if len(same) > 1 else "")
         return groups
 
     def _compared(self, group: Group, families: int) -> Group:

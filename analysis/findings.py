@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Callable, Iterator
 
 from . import statistics, text
-from .comparison import Analysis, Group
+from .comparison import Analysis, Group, Panel
 from .figures.balance import imbalance
 from .figures.scaling import curves
 from .load import Record
@@ -130,7 +130,11 @@ def scaling(analysis: Analysis) -> Iterator[Finding]:
         relative = [statistics.paired_samples(r.samples, analysis.thread_base[r.id].samples) for _, r in reached]
         apart = len(reached) > 1 and all(samples.n for samples in relative) and statistics.compare_with_best(
             relative, analysis.study.target, len(analysis.groups))[1][0].verdict == "slower" and most.low > least.high
-        if apart:
+        if most.high < 1:
+            yield Finding("scaling", 3.0 + min(1.0, cautious(most)), f"On {where(group)} no kernel gains from {threads} threads: {good.config.kernel}"
+                          f" ({analysis.execution(good)}) comes closest with {by(most)} its speed on one thread, {worst.config.kernel}"
+                          f" ({analysis.execution(worst)}) is last with {by(least)} ({bases}).")
+        elif apart:
             yield Finding("scaling", 2.2 + min(1.5, math.log2(most.low / least.high)) + (0.8 if least.high < 1 else 0),
                           f"On {where(group)} with {threads} threads {good.config.kernel} ({analysis.execution(good)}) scales best,"
                           f" {by(most)} over itself on one thread, and {worst.config.kernel} ({analysis.execution(worst)}) least,"
@@ -154,28 +158,34 @@ def _seconds(analysis: Analysis, record: Record) -> str:
 def schedules(analysis: Analysis) -> Iterator[Finding]:
     """How much the schedule, the partitioner and the chunk matter to a kernel."""
     flat: list[tuple[int, str]] = []
-    for group in analysis.groups:
-        for panel in (p for p in analysis.panels if p.group is group):
-            threads = panel.threads
-            timed = [r for r in panel.cells.values() if r.ok]
-            best = next(r for r in timed if panel.comparisons[r.id].verdict == "best")
-            apart = [r for r in timed if panel.comparisons[r.id].verdict == "slower"]
-            if apart:
-                worst = max(apart, key=lambda r: panel.comparisons[r.id].ratio.value)
-                ratio = panel.comparisons[worst.id].ratio
-                near = [r for r in timed if r is not best and panel.comparisons[r.id].verdict != "slower"]
-                tail = f"; {text.count(len(near), 'other choice')} cannot be told apart from the best" if near else ""
-                # A schedule of a kernel that is far from the fastest is of less use.
-                behind = math.log2(_median(analysis, best) / _median(analysis, group.best))
-                yield Finding("schedule", 2.4 + 1.5 * min(1.5, cautious(ratio)) - 0.25 * min(behind, 4),
-                              f"On {where(group)} with {text.count(threads, 'thread')} the schedule of {panel.kernel} matters by"
-                              f" {by(ratio)}: {analysis.execution(best)} takes {analysis.time(best)}, {analysis.execution(worst)}"
-                              f" {analysis.time(worst)}{tail}.")
-            elif all(c.ratio.has_interval for c in panel.comparisons.values() if c.verdict != "best"):
-                widest = max((c.ratio.high for c in panel.comparisons.values() if c.verdict != "best"), default=1.0)
-                flat.append((len(timed), f"On {where(group)} with {text.count(threads, 'thread')} the {len(timed)} schedules of"
-                             f" {panel.kernel} cannot be told apart (fastest {analysis.execution(best)}, {analysis.time(best)}; the others"
-                             f" take at most {text.number(widest)} times as long)."))
+    cases: list[tuple[Panel, str, list[Record]]] = []
+    for panel in analysis.panels:
+        timed = [r for r in panel.cells.values() if r.ok]
+        # Within one backend: OpenMP against oneTBB is a finding of its own.
+        for backend in dict.fromkeys(r.config.backend for r in timed):
+            mine = [r for r in timed if r.config.backend == backend]
+            if len(mine) > 1:
+                cases.append((panel, backend, mine))
+    for panel, backend, timed in cases:
+        group, threads = panel.group, text.count(panel.threads, "thread")
+        index, comparisons = statistics.compare_with_best([r.samples for r in timed], analysis.study.target, len(cases))
+        best = timed[index]
+        slower = [(c, r) for c, r in zip(comparisons, timed) if c.verdict == "slower"]
+        if slower:
+            worst, record = max(slower, key=lambda pair: pair[0].ratio.value)
+            near = len(timed) - 1 - len(slower)
+            tail = f"; {text.count(near, 'other choice')} cannot be told apart from the best" if near else ""
+            # A schedule of a kernel that is far from the fastest is of less use.
+            behind = math.log2(_median(analysis, best) / _median(analysis, group.best))
+            yield Finding("schedule", 2.4 + 1.5 * min(1.5, cautious(worst.ratio)) - 0.25 * min(behind, 4),
+                          f"On {where(group)} with {threads} the {backend} schedule of {panel.kernel} matters by {by(worst.ratio)}:"
+                          f" {analysis.execution(best)} takes {analysis.time(best)}, {analysis.execution(record)}"
+                          f" {analysis.time(record)}{tail}.")
+        elif all(c.ratio.has_interval for c in comparisons if c.verdict != "best"):
+            widest = max((c.ratio.high for c in comparisons if c.verdict != "best"), default=1.0)
+            flat.append((len(timed), f"On {where(group)} with {threads} the {len(timed)} {backend} schedules of {panel.kernel} cannot be"
+                         f" told apart (fastest {analysis.execution(best)}, {analysis.time(best)}; by their intervals the others take at"
+                         f" most {text.number(widest)} times as long)."))
     if flat:
         yield Finding("no schedule effect", 1.9, max(flat)[1])
 

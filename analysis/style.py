@@ -67,6 +67,13 @@ def text_width(texts: list[str], size: float, bold: bool = False) -> float:
                default=0.0) / 72
 
 
+def title(figure: Figure, words: str, top: float = 0.13) -> None:
+    """A bold line at the upper left, top inches below the edge; smaller where a long name would leave the page."""
+    width, height = figure.get_size_inches()
+    size = min(8.5, 8.5 * (width - 0.2) / max(0.1, text_width([words], 8.5, bold=True)))
+    figure.text(0.1 / width, 1 - top / height, words, fontsize=size, weight="bold", va="center")
+
+
 def legend_columns(labels: list[str], width: float = FULL_WIDTH) -> int:
     """As many columns as fit into the width; a handle and its gaps take about 0.55 inches."""
     return max(1, min(len(labels), int(width / (text_width(labels, 7.5) + 0.6)))) if labels else 1

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "base/error.h"
+#include "base/suggest.h"
 #include "build_info.h"
 #include "harness/commands.h"
 
@@ -38,6 +40,12 @@ int run(int argc, char** argv) {
     app.parse(arguments);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
+    std::vector<std::string> known;
+    for (const CLI::App* command :
+         app.get_subcommands([](const CLI::App* c) { return !c->get_group().empty(); }))
+      known.push_back(command->get_name());
+    if (app.get_subcommands().empty() && argc > 1 && argv[1][0] != '-')
+      throw InputError(unknown_name("command", argv[1], known));
     fmt::print(stderr, "rasterbench: {}; see --help\n", error.what());
     return 2;
   }

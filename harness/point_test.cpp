@@ -1,1 +1,62 @@
+#include "harness/point.h"
+
 #include <gtest/gtest.h>
+
+#include "base/error.h"
+
+namespace rasterbench {
+namespace {
+
+Point sample_point() {
+  Point point;
+  point.scene = {"racer", "racer.dat", "racer.txt"};
+  point.width = 640;
+  point.height = 480;
+  point.kernel = "tile_parallel";
+  point.execution = {"openmp", "dynamic", 16, 2};
+  return point;
+}
+
+TEST(Point, NameHoldsEveryAxisAndOnlyUnusualExtras) {
+  Point point = sample_point();
+  EXPECT_EQ(point_name(point), "racer/640x480/tile_parallel/f32/closed/clip/openmp:dynamic,16/2");
+  point.environment = {"close", "active", "libomp"};
+  point.tile = 32;
+  point.cache = "cold";
+  EXPECT_EQ(point_name(point),
+            "racer/640x480/tile_parallel/f32/closed/clip/openmp:dynamic,16/2/binding:close/wait:active/"
+            "runtime:libomp/"
+            "tile:32/cache:cold");
+}
+
+TEST(Point, SurvivesJson) {
+  Point point = sample_point();
+  point.fill = FillRule::kTopLeft;
+  point.near_rule = NearRule::kOff;
+  point.execution.chunk.reset();
+  const Point back = point_from_json(Json::parse(point_to_json(point).dump()));
+  EXPECT_EQ(point_name(back), point_name(point));
+  EXPECT_EQ(back.scene.parameters, "racer.txt");
+  EXPECT_FALSE(back.execution.chunk);
+}
+
+TEST(Point, SceneReferences) {
+  EXPECT_EQ(parse_scene_reference("a/city.dat@a/city_street.txt").name, "city@city_street");
+  EXPECT_EQ(parse_scene_reference("a/city.dat@b/city.txt").name, "city");
+  EXPECT_EQ(parse_scene_reference("a/city.dat").parameters, "");
+  EXPECT_EQ(parse_scene_reference("terrain:roughness=0.5").name, "terrain:roughness=0.5");
+  EXPECT_EQ(parse_scene_reference("terrain:roughness=0.5").model, "terrain:roughness=0.5");
+}
+
+TEST(Point, ParsesExecutionsAndSizes) {
+  EXPECT_EQ(to_string(parse_execution("openmp:guided,8", "x")), "openmp:guided,8");
+  EXPECT_EQ(to_string(parse_execution("serial", "x")), "serial");
+  EXPECT_EQ(parse_size("1x65536", "x"), (std::pair{1, 65536}));
+  for (const char* bad : {"", "x", "10", "0x5", "5x0", "65537x1", "-1x5", "10x10x10", "1e3x5", " 5x5"})
+    EXPECT_THROW(parse_size(bad, "x"), InputError) << bad;
+  for (const char* bad : {"openmp:dynamic,", "openmp:dynamic,0", "openmp:dynamic,-1", "openmp:dynamic,2x"})
+    EXPECT_THROW(parse_execution(bad, "x"), InputError) << bad;
+}
+
+}  // namespace
+}  // namespace rasterbench

@@ -1,1 +1,125 @@
+#include "harness/study.h"
+
 #include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <fstream>
+
+#include "base/error.h"
+
+namespace rasterbench {
+namespace {
+
+class StudyTest : public testing::Test {
+ protected:
+  std::filesystem::path path_ =
+      std::filesystem::temp_directory_path() / ("study_test." + std::to_string(getpid()) + ".toml");
+  ~StudyTest() override { std::filesystem::remove(path_); }
+
+  Study read(const std::string& text, const StudyOptions& options = {}) {
+    std::ofstream(path_) << text;
+    return read_study(path_, options);
+  }
+  std::string error_of(const std::string& text) {
+    try {
+      read(text);
+    } catch (const InputError& error) {
+      const std::string what = error.what(), prefix = path_.string() + ":";
+      return what.starts_with(prefix) ? what.substr(prefix.size()) : what;
+    }
+    return "no error";
+  }
+};
+
+const std::string kSweep = R"(
+[[sweep]]
+scene = "teapot:triangles=300"
+size = "64x48"
+)";
+
+std::vector<std::string> names(const Study& study) {
+  std::vector<std::string> all;
+  for (const PlannedPoint& point : study.points)
+    all.push_back(point.name.substr(point.name.find("64x48/") + 6));
+  return all;
+}
+
+TEST_F(StudyTest, SpansTheCrossProductOnce) {
+  const Study study = read(kSweep + R"(
+kernel = ["scanline", "tile_parallel"]
+execution = ["serial", "openmp:static", "openmp:auto"]
+chunk = ["default", 4]
+threads = [1, 1]
+)");
+  EXPECT_EQ(
+      names(study),
+      (std::vector<std::string>{
+          "scanline/f32/closed/clip/serial/1", "scanline/f32/closed/clip/openmp:static/1",
+          "scanline/f32/closed/clip/openmp:static,4/1", "scanline/f32/closed/clip/openmp:auto/1",
+          "tile_parallel/f32/closed/clip/serial/1", "tile_parallel/f32/closed/clip/openmp:static/1",
+          "tile_parallel/f32/closed/clip/openmp:static,4/1", "tile_parallel/f32/closed/clip/openmp:auto/1"}));
+}
+
+TEST_F(StudyTest, SkipsWithReasons) {
+  const Study study = read(kSweep + R"(
+kernel = ["all_pixels", "triangle_atomics"]
+numeric = ["f64"]
+execution = "openmp:static"
+threads = [1, 60000]
+[sampling]
+point_seconds = 0.01
+)");
+  ASSERT_EQ(study.points.size(), 4u);
+  EXPECT_NE(study.points[0].skip.find("exceeds the point's time limit of 0.01 s"), std::string::npos);
+  EXPECT_NE(study.points[1].skip.find("needs --oversubscribe"), std::string::npos);
+  EXPECT_NE(study.points[2].skip.find("triangle_atomics cannot run in mode f64"), std::string::npos);
+}
+
+TEST_F(StudyTest, ErrorsNameLineKeyAndSuggest) {
+  EXPECT_EQ(error_of("nmae = \"x\"\n"), "1: nmae: unknown key of a study 'nmae'; did you mean 'name'?");
+  EXPECT_EQ(error_of(kSweep + "kernel = \"tile_paralel\"\nexecution = \"serial\"\n"),
+            "5: kernel: kernel: unknown kernel 'tile_paralel'; did you mean 'tile_parallel'?");
+  EXPECT_EQ(error_of(kSweep + "kernels = \"all\"\nexecution = \"serial\"\nkernel = \"all\"\n"),
+            "5: kernels: unknown key of [[sweep]] 'kernels'; did you mean 'kernel'?");
+  EXPECT_EQ(error_of("[sampling]\ntarget = 2\n"), "2: target: must be a number from 0.0001 to 1");
+  EXPECT_EQ(error_of("name = \"x\"\n"), " sweep: a study needs at least one [[sweep]]");
+  EXPECT_EQ(error_of("name = \"x\"\nseed = =\n").substr(0, 2), "2:");
+  EXPECT_EQ(error_of(kSweep + "kernel = []\nexecution = \"serial\"\n"), "5: kernel: is an empty list");
+}
+
+TEST_F(StudyTest, FilterAndShardsPartition) {
+  const std::string text = kSweep + R"(
+kernel = "all"
+execution = ["serial", "openmp:static"]
+threads = [1, 2]
+)";
+  StudyOptions options;
+  options.filter = std::regex("serial");
+  EXPECT_EQ(read(text, options).points.size(), 8u);
+  options.filter_excludes = true;
+  EXPECT_EQ(read(text, options).points.size(), 16u);
+
+  std::vector<std::string> all, families;
+  for (int shard = 1; shard <= 3; ++shard) {
+    StudyOptions part;
+    part.shard = shard;
+    part.shards = 3;
+    std::vector<std::string> own;
+    for (const PlannedPoint& planned : read(text, part).points) {
+      all.push_back(planned.name);
+      own.push_back(family_of(planned.point));
+    }
+    std::sort(own.begin(), own.end());
+    own.erase(std::unique(own.begin(), own.end()), own.end());
+    families.insert(families.end(), own.begin(), own.end());
+  }
+  std::sort(all.begin(), all.end());
+  EXPECT_EQ(all.size(), 24u);
+  EXPECT_EQ(std::unique(all.begin(), all.end()), all.end());
+  std::sort(families.begin(), families.end());
+  EXPECT_EQ(std::unique(families.begin(), families.end()), families.end()) << "a family is in two shards";
+}
+
+}  // namespace
+}  // namespace rasterbench

@@ -78,5 +78,14 @@ TYPED_TEST(Depth, GradientsThatOverflowStayWithinTheCorners) {
   }
 }
 
+TEST(DepthPlanes, ANumberThatIsNoneBecomesTheLowerEnd) {
+  constexpr float inf = std::numeric_limits<float>::infinity();
+  const DepthPlane<float> plane{.d0 = 0.5f, .gx = inf, .gy = -inf, .low = 0.25f, .high = 0.75f};
+  EXPECT_EQ(plane.at(0, 1), 0.25f);  // inf * 0
+  EXPECT_EQ(plane.at(1, 1), 0.25f);  // inf - inf
+  EXPECT_EQ(plane.at(1, -1), 0.75f);
+  EXPECT_EQ(plane.at(-1, 1), 0.25f);
+}
+
 }  // namespace
 }  // namespace rasterbench

@@ -134,9 +134,12 @@ TYPED_TEST(Exactness, EachEdgeIsAHalfLineAlongARow) {
       for (const FillRule fill : kFillRules) {
         const auto prepared = prepare<TypeParam>(corners[0], corners[1], corners[2], fill);
         for (int k = 0; k < 3; ++k) {
-          const double s = random.uniform();
-          const int x = static_cast<int>(corners[0].x + s * (corners[1].x - corners[0].x));
-          const int y = static_cast<int>(corners[0].y + s * (corners[1].y - corners[0].y));
+          // About where an edge crosses a row's centres: there the products are nearly equal.
+          const Point &a = corners[static_cast<std::size_t>(k)],
+                      &b = corners[static_cast<std::size_t>((k + 1) % 3)];
+          const int y = static_cast<int>(std::floor(a.y + random.uniform() * (b.y - a.y)));
+          const double s = std::clamp((y + 0.5 - a.y) / (b.y - a.y), 0.0, 1.0);
+          const int x = static_cast<int>(a.x + (b.y != a.y ? s : 0.5) * (b.x - a.x));
           for (int e = 0; e < 3; ++e) {
             const int changes = changes_along_row<TypeParam>(prepared, e, y, x - 300, x + 300);
             ASSERT_LE(changes, 1) << "extent " << extent << ", triangle " << i << ", edge " << e << ", row "

@@ -52,9 +52,10 @@ TEST(Fixed8, EqualsExactIntegersUpToTheGuardBand) {
   };
   std::int64_t covered = 0, on_edges = 0;
   for (int i = 0; i < 4000; ++i) {
-    // Corners up to +-2^17 px, snapped to 1/8 px as the float32 there is, and edges through centres.
+    // Corners up to +-2^17 px, on every second 1/256 px, as float32 is there, or on halves, so that edges run
+    // through centres.
     const std::int64_t extent = i % 2 == 0 ? kBand : std::int64_t{512} * 256;
-    const std::int64_t grid = i % 4 < 2 ? 128 : 32;
+    const std::int64_t grid = i % 4 < 2 ? 128 : 2;
     IntTriangle t;
     for (IntPoint& p : t) p = {within(extent / grid) * grid, within(extent / grid) * grid};
     const auto pixels = [](const IntPoint& p) {

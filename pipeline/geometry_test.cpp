@@ -117,6 +117,10 @@ TEST(Geometry, RejectsWhatMissesTheImage) {
     const Triangle t{{-1 + dx, -1 + dy, -2}, {1 + dx, -1 + dy, -2}, {dx, 1 + dy, -4}};
     expect_rejected(t, &GeometryCounts::off_screen);
   }
+  // Beyond the shorter side of a picture and within the longer one: 5 to 7 px to the right, or down.
+  const Triangle right{{3, 2, -2}, {5, 2, -2}, {4, 3, -2}}, below{{-3, -2, -2}, {-2, -2, -2}, {-2, -3, -2}};
+  EXPECT_EQ(run_geometry({right}, {}, plain_camera(4, 8)).counts.off_screen, 1);
+  EXPECT_EQ(run_geometry({below}, {}, plain_camera(8, 4)).counts.off_screen, 1);
   // A corner of the image is enough to be looked at.
   EXPECT_EQ(
       run_geometry({Triangle{at_pixel(-5, -5, 2), at_pixel(1, -4, 2), at_pixel(-4, 1, 2)}}).counts.drawn, 1);

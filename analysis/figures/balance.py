@@ -10,7 +10,7 @@ from .. import captions, style, text
 from ..comparison import Analysis, Group
 from ..load import Record
 from ..statistics import is_number
-from .common import Block, Drawing, Row, execution_rows, named, pages, part, row_frame
+from .common import Block, Drawing, Row, drawn_together, execution_rows, named, pages, part, row_frame
 
 SECTION = "Balance of the threads"
 
@@ -32,7 +32,7 @@ def imbalance(record: Record) -> float | None:
 def draw(analysis: Analysis) -> Iterator[Drawing]:
     for group in analysis.groups:
         records = [r for r in group.timed if busy(r)]
-        if records:
+        if records and not drawn_together(analysis, group):
             yield from _draw(analysis, group, max(r.config.threads for r in records))
 
 

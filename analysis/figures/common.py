@@ -17,6 +17,7 @@ from ..load import Record
 ROW_HEIGHT = 0.175  # inches
 MAX_ROWS = 44  # more rows go to a further figure
 LABEL_SIZE = 7.5
+SMALL = 6  # a group with fewer timed points has no figures of its own if it can be drawn beside its like
 
 
 @dataclass(frozen=True)
@@ -111,7 +112,7 @@ def row_frame(blocks: list[Block], title: str, unit: str, *, limits: tuple[float
     style.number_axis(axes, *limits, log)
     axes.grid(axis="x")
     axes.set_xlabel(unit)
-    figure.text(0.1 / style.FULL_WIDTH, 1 - 0.2 / height, title, fontsize=8.5, weight="bold", va="center")
+    style.title(figure, title, 0.2)
     placed: list[tuple[float, Row]] = []
     y = 0
     for i, block in enumerate(blocks):
@@ -198,6 +199,21 @@ def untimed_rows(analysis: Analysis, group: Group, kernel: str, most: int = 3) -
         else:
             rows.append(Row(text.count(len(records), "point"), message=message))
     return rows
+
+
+def families(analysis: Analysis) -> list[list[Group]]:
+    """Groups that share scene and size, and so differ in their arithmetic or its fill and near rules."""
+    found: dict[tuple, list[Group]] = {}
+    for group in analysis.groups:
+        if group.timed:
+            config = group.records[0].config
+            found.setdefault((config.scene, config.scene_hash, config.size), []).append(group)
+    return [groups for groups in found.values() if len(groups) > 1]
+
+
+def drawn_together(analysis: Analysis, group: Group) -> bool:
+    """Whether a group is too small for figures of its own and is shown beside its other numeric modes instead."""
+    return len(group.timed) < SMALL and any(group in groups for groups in families(analysis))
 
 
 def bounds(points: list[Point]) -> tuple[float, float]:

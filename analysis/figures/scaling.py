@@ -12,7 +12,7 @@ from .. import captions, statistics, style, text
 from ..comparison import Analysis, Group
 from ..load import Record
 from ..statistics import Estimate
-from .common import Block, Drawing, Row, bounds, dots, execution_rows, named, pages, part, spread
+from .common import Block, Drawing, Row, drawn_together, bounds, dots, execution_rows, named, pages, part, spread
 from .times import point, thread_series
 
 SECTION = "Speedup and efficiency"
@@ -21,6 +21,8 @@ COLUMNS = 3
 
 def draw(analysis: Analysis) -> Iterator[Drawing]:
     for group in analysis.groups:
+        if drawn_together(analysis, group):
+            continue
         counts = sorted({r.config.threads for r in group.timed if r.config.backend != "serial"})
         if len(counts) > 1:
             yield from _over_threads(analysis, group, counts)
@@ -61,7 +63,7 @@ def _summary(analysis: Analysis, group: Group, best: dict[str, tuple[str, list[R
     height = 2.45 + foot + 0.58
     figure = style.new_figure(style.FULL_WIDTH, height)
     wide = (style.FULL_WIDTH - 0.1) / len(panels)
-    axes = [style.place(figure, 0.5 + i * wide, foot, wide - 0.6, 2.45) for i in range(len(panels))]
+    axes = [style.place(figure, 0.58 + i * wide, foot, wide - 0.68, 2.45) for i in range(len(panels))]
     keys = []
     for i, (kernel, (execution, records)) in enumerate(best.items()):
         base = analysis.thread_base[records[-1].id]
@@ -86,7 +88,7 @@ def _summary(analysis: Analysis, group: Group, best: dict[str, tuple[str, list[R
         else:
             panel.axhline(1, color="black", lw=0.8, ls=(0, (4, 2)), zorder=1)
         panel.set_ylim(0, max(panel.get_ylim()[1], 1.1))
-    figure.text(0.1 / style.FULL_WIDTH, 1 - 0.13 / height, group.title, fontsize=8.5, weight="bold", va="center")
+    style.title(figure, group.title)
     figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.05 / style.FULL_WIDTH, 0.03 / height), ncol=1,
                   borderaxespad=0.2)
     shown = [r for _, records in best.values() for r in records]
@@ -160,7 +162,7 @@ def _panels(analysis: Analysis, group: Group, every: dict[tuple[str, str], list[
     panels = []
     for i, kernel in enumerate(kernels):
         row, column = divmod(i, COLUMNS)
-        axes = style.place(figure, 0.45 + column * wide, height - 0.3 - (row + 1) * each + 0.4, wide - 0.55, each - 0.75)
+        axes = style.place(figure, 0.5 + column * wide, height - 0.3 - (row + 1) * each + 0.4, wide - 0.6, each - 0.75)
         panels.append(axes)
         lines = [(e, records) for (k, e), records in every.items() if k == kernel]
         bases = []
@@ -181,7 +183,7 @@ def _panels(analysis: Analysis, group: Group, every: dict[tuple[str, str], list[
         axes.set_ylim(0, top)
     keys = [Line2D([], [], color=style.look(i).colour, marker=style.look(i).marker, ms=4, label=name)
             for i, name in enumerate(executions)]
-    figure.text(0.1 / style.FULL_WIDTH, 1 - 0.13 / height, group.title, fontsize=8.5, weight="bold", va="center")
+    style.title(figure, group.title)
     figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.05 / style.FULL_WIDTH, 0.03 / height), ncol=columns,
                   borderaxespad=0.2, columnspacing=1.2)
     shown = [r for records in every.values() for r in records]

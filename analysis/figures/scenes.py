@@ -39,7 +39,8 @@ def draw(analysis: Analysis) -> Iterator[Drawing]:
         axes.set_yticks([])
         for spine in axes.spines.values():
             spine.set(visible=True, color="#BBBBBB")
-        axes.set_title(scene, loc="left", weight="bold", pad=20)
+        fits = min(8.5, 8.5 * width / max(0.1, style.text_width([scene], 8.5, bold=True)))
+        axes.set_title(scene, loc="left", weight="bold", pad=20, fontsize=max(5.0, fits), wrap=True)
         axes.text(0, 1.02, _facts(analysis, scene), transform=axes.transAxes, fontsize=7, va="bottom", linespacing=1.15)
     caption = captions.build(
         analysis, "The scenes", "What each scene asks of a rasterizer: many small triangles, few large ones, much overdraw.",

@@ -29,7 +29,9 @@ def draw(analysis: Analysis) -> Iterator[Drawing]:
 
 
 def _draw(analysis: Analysis, group: Group, panels: list[Panel], threads: int) -> Iterator[Drawing]:
-    rows = list(dict.fromkeys(row for panel in panels for row, _ in panel.cells))
+    backends = list(dict.fromkeys(r.config.backend for panel in panels for r in panel.cells.values()))
+    found = {row: backends.index(r.config.backend) for panel in panels for (row, _), r in panel.cells.items()}
+    rows = sorted(found, key=found.__getitem__)  # stable: within a backend in the order of the study
     chunks = sorted({chunk for panel in panels for _, chunk in panel.cells}, key=lambda c: -1 if c is None else c)
     across = max(1, min(3, int(5.2 / (0.42 * len(chunks) + 0.15)), len(panels)))
     down = max(1, int((style.MAX_HEIGHT - 1.3) / (len(rows) * CELL_HEIGHT + 0.45)))
@@ -67,8 +69,7 @@ def _figure(analysis: Analysis, group: Group, panels: list[Panel], rows: list[st
         axes.set_xticks(range(len(chunks)), [_chunk(c) for c in chunks] if last else [""] * len(chunks), fontsize=7)
         if last:
             axes.set_xlabel("chunk or grain (iterations)", fontsize=7.5, labelpad=2)
-    figure.text(0.1 / style.FULL_WIDTH, 1 - 0.13 / height, f"{group.title}, {text.count(threads, 'thread')}{suffix}: median"
-                " time of a frame (ms)", fontsize=8.5, weight="bold", va="center")
+    style.title(figure, f"{group.title}, {text.count(threads, 'thread')}{suffix}: median time of a frame (ms)")
     bar = style.place(figure, left, 0.34, 2.0, 0.09)
     figure.colorbar(ScalarMappable(norm, SHADES), cax=bar, orientation="horizontal",
                     extend="max" if _worst(panels) > DARKEST else "neither")

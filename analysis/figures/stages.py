@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 from .. import captions, style, text
 from ..comparison import Analysis, Group
 from ..load import STAGES, Record
-from .common import Block, Drawing, Row, named, pages, part, row_frame
+from .common import Block, Drawing, Row, drawn_together, named, pages, part, row_frame
 
 SECTION = "Stages of a frame"
 MOST = 30  # bars; with more, only the fastest execution of each kernel, backend and thread count
@@ -19,7 +19,7 @@ MOST = 30  # bars; with more, only the fastest execution of each kernel, backend
 
 def draw(analysis: Analysis) -> Iterator[Drawing]:
     for group in analysis.groups:
-        if any(record.stages for record in group.timed):
+        if any(record.stages for record in group.timed) and not drawn_together(analysis, group):
             yield from _draw(analysis, group)
 
 

@@ -8,14 +8,14 @@ from .. import captions, text
 from ..comparison import Analysis, Group
 from ..load import Record
 from ..statistics import Estimate
-from .common import Block, Drawing, Point, Row, bounds, dots, execution_rows, named, pages, part, spread, untimed_rows
+from .common import Block, Drawing, Point, Row, bounds, dots, drawn_together, execution_rows, named, pages, part, spread, untimed_rows
 
 SECTION = "Time per strategy"
 
 
 def draw(analysis: Analysis) -> Iterator[Drawing]:
     for group in analysis.groups:
-        if group.timed:
+        if group.timed and not drawn_together(analysis, group):
             yield from _draw(analysis, group)
 
 

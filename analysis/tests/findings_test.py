@@ -10,7 +10,7 @@ from .. import findings
 from . import synthetic
 from .conftest import analyse
 
-CLAIM = re.compile(r"faster than|slower than|matters by|scales best|depends on|is the fastest kernel")
+CLAIM = re.compile(r"faster than|slower than|matters by|scales best|no kernel gains|depends on|is the fastest kernel")
 
 
 def test_three_findings_with_intervals(full):
