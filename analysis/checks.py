@@ -8,6 +8,7 @@ from typing import Any, Iterator
 
 from . import statistics, text
 from .comparison import Analysis
+from .figures.balance import busy
 from .load import Record
 
 NOT_PUBLISHABLE = "not publishable"
@@ -137,6 +138,10 @@ def _threads(analysis: Analysis) -> Iterator[Warn]:
     fewer = [r for r in analysis.study.timed if r.threads_observed is not None and r.threads_observed < r.config.threads]
     if fewer:
         yield Warn(NOT_PUBLISHABLE, f"fewer threads ran than were asked for in {_some(fewer, analysis)}.")
+    idle = [r for r in analysis.study.timed if (times := busy(r)) and min(times) < 0.01 * max(times)]
+    if idle:
+        yield Warn(NOTE, f"a thread did next to nothing (under 1 % of the busiest one's time) in {_some(idle, analysis)}: these times are"
+                   f" those of fewer threads than their label says (first: {analysis.label(idle[0])}).")
     allowed = analysis.study.context["machine"].get("cpus_allowed")
     if isinstance(allowed, list) and allowed:
         over = [r for r in analysis.study.timed if r.config.threads > len(allowed)]

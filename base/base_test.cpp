@@ -51,7 +51,13 @@ TEST(Suggestions, PreferTheNearerName) {
             "unknown kernel 'row_paralel'; did you mean 'row_parallel'?");
 }
 
+TEST(Suggestions, PreferTheFirstOfEquallyNearNames) {
+  EXPECT_EQ(unknown_name("mode", "fixed_7", std::vector<std::string>{"fixed_8", "fixed_4"}),
+            "unknown mode 'fixed_7'; did you mean 'fixed_8'?");
+}
+
 TEST(Suggestions, ListAllWhereNoneIsNear) {
+  EXPECT_EQ(unknown_name("mode", "abc", std::vector<std::string>{"f32"}), "unknown mode 'abc'; known: f32");
   EXPECT_EQ(unknown_name("schedule", "fibonacci", std::vector<std::string>{"static", "auto"}),
             "unknown schedule 'fibonacci'; known: static, auto");
   EXPECT_EQ(unknown_name("schedule", "", std::vector<std::string>{"static", "auto"}),

@@ -172,7 +172,8 @@ TEST(OpenMp, DynamicKeepsChunksTogether) {
   for (std::size_t i = 0; i < workers.size(); ++i) EXPECT_EQ(workers[i], workers[i / 5 * 5]);
 }
 
-// libgomp's auto is static with the chunk of whatever loop ran before (measured; measuring.md).
+// libgomp's auto is static with the chunk of whatever loop ran before where parallel and for are one
+// construct, or GCC makes them one (measured).
 TEST(OpenMp, AutoDoesNotInheritTheChunkOfTheLoopBefore) {
   if (openmp_runtime() != "libgomp") GTEST_SKIP() << "auto is deterministic in libgomp only";
   const auto fixed = make_execution({"openmp", "static", {}, 3});

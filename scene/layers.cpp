@@ -18,6 +18,7 @@ constexpr double kAspect = 16.0 / 9.0;
 constexpr double kOverhang = 1.02;             // a wall is this much larger than the picture
 constexpr double kDistance = 4;                // the camera's, from the origin, on the z axis
 constexpr double kNearest = 2, kFarthest = 6;  // distances of the first and the last wall from the camera
+constexpr double kRelief = 0.05;               // deepest dent of a lone wall
 
 enum Order { kFrontToBack, kBackToFront, kRandom };
 
@@ -32,14 +33,18 @@ Grid grid_for(double quads) {
   return {static_cast<std::int64_t>(columns), static_cast<std::int64_t>(rows)};
 }
 
-void add_wall(std::vector<Triangle>& triangles, double distance, const Grid& grid) {
-  const double half_height = kOverhang * kTanHalf * distance;
-  const double half_width = kAspect * half_height;
+void add_wall(std::vector<Triangle>& triangles, double distance, double relief, const Grid& grid,
+              Random random) {
+  std::vector<double> dents(static_cast<std::size_t>((grid.columns + 1) * (grid.rows + 1)));
+  for (double& dent : dents) dent = random.uniform(-relief, relief);
   const auto corner = [&](std::int64_t column, std::int64_t row) {
+    const double d = distance + dents[static_cast<std::size_t>(row * (grid.columns + 1) + column)];
+    const double half_height =
+        kOverhang * kTanHalf * d;  // along the line of sight: the grid on the screen stays even
     const double x = 2 * static_cast<double>(column) / static_cast<double>(grid.columns) - 1;
     const double y = 2 * static_cast<double>(row) / static_cast<double>(grid.rows) - 1;
-    return Vec3{static_cast<float>(half_width * x), static_cast<float>(half_height * y),
-                static_cast<float>(kDistance - distance)};
+    return Vec3{static_cast<float>(kAspect * half_height * x), static_cast<float>(half_height * y),
+                static_cast<float>(kDistance - d)};
   };
   for (std::int64_t row = 0; row < grid.rows; ++row) {
     for (std::int64_t column = 0; column < grid.columns; ++column) {
@@ -65,14 +70,16 @@ Scene make_layers(const GeneratorValues& values) {
   const Grid grid = grid_for(values.number("triangles") / (2 * static_cast<double>(depth)));
 
   Scene scene;
+  const auto seed = static_cast<std::uint64_t>(values.integer("seed"));
+  const double step = (kFarthest - kNearest) / static_cast<double>(std::max<std::int64_t>(1, depth - 1));
+  const double relief = std::min(kRelief, 0.3 * step);
   scene.model.triangles = room_for_triangles(2 * depth * grid.columns * grid.rows);
   for (std::int64_t i = 0; i < depth; ++i) {
     const std::int64_t layer = order == kBackToFront ? depth - 1 - i : i;  // 0 is the nearest
-    const double step = (kFarthest - kNearest) / static_cast<double>(std::max<std::int64_t>(1, depth - 1));
-    add_wall(scene.model.triangles, kNearest + step * static_cast<double>(layer), grid);
+    add_wall(scene.model.triangles, kNearest + step * static_cast<double>(layer), relief, grid,
+             Random(seed * 1000003 + static_cast<std::uint64_t>(layer)));
   }
-  if (order == kRandom)
-    shuffle(scene.model.triangles, Random(static_cast<std::uint64_t>(values.integer("seed"))));
+  if (order == kRandom) shuffle(scene.model.triangles, Random(seed));
 
   scene.parameters.camera = {0, 0, kDistance};
   scene.parameters.near_plane = 1;
@@ -99,7 +106,7 @@ const GeneratorRegistration kLayers({
               .meaning = "of the ids: the nearest wall first, the farthest first, or all triangles shuffled",
               .words = {"front-to-back", "back-to-front", "random"}},
              {.name = "seed",
-              .meaning = "of order=random",
+              .meaning = "of the relief, and of order=random",
               .default_value = 1,
               .maximum = kMaxSeed,
               .integer = true}},

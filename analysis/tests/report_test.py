@@ -206,6 +206,8 @@ def test_warnings(study):
     def spoil(records):
         for entry in records:
             entry["config"]["binding"] = "none"
+            if len(entry["per_thread"]) > 1:
+                entry["per_thread"][1]["busy_ms"] = 0.0
         records[0]["stop"] = "time_limit"
         records[0]["median_ms"] = 1e3
         records[1]["threads_observed"] = 0
@@ -219,7 +221,7 @@ def test_warnings(study):
     path.write_text(json.dumps(context))
     said = " ".join(warn.text for warn in checks.check(analyse(directory)))
     for words in ("dirty commit", "load average 7.25", "not pinned", "stopped by the time limit of the study", "no picture found for lost",
-                  "differs from what their samples give", "fewer threads ran", "no cpufreq"):
+                  "differs from what their samples give", "fewer threads ran", "no cpufreq", "next to nothing"):
         assert words in said, words
 
 
@@ -321,3 +323,35 @@ def test_many_schedules_stay_in_page_height(study):
         width, height = drawing.figure.get_size_inches()
         assert width <= 7.0 and height <= 9.6, drawing.name
     assert len(findings.top(analysis)) == 3
+
+
+def test_numeric_modes_of_one_scene_share_a_figure(study, capsys):
+    def modes(records):
+        for numeric in ("f64", "fixed_8"):
+            for entry in [e for e in records if e["config"]["kernel"] == "scanline" and e["config"]["numeric"] == "f32"]:
+                twin = json.loads(json.dumps(entry))
+                twin["config"]["numeric"], twin["id"] = numeric, numeric + entry["id"]
+                records.append(twin)
+
+    directory = study(edit=modes)
+    prints_three(capsys, directory)
+    names = {p.stem for p in (directory / "figures").glob("*.svg")}
+    assert "numerics_teapot_640x360" in names and "time_teapot_640x360_f32" in names
+    assert "time_teapot_640x360_f64" not in names  # one point: drawn beside its like
+    assert (directory / "tables" / "points_teapot_640x360_f64.csv").exists()
+
+
+def test_long_scene_names_keep_their_files_apart(study, capsys):
+    name = "confetti:triangles=20000,size=16,distribution=heavy,seed=7,and=more"
+
+    def rename(records):
+        for entry in records:
+            entry["config"]["scene"] = name
+        for entry in [json.loads(json.dumps(e)) for e in records]:
+            entry["config"]["fill"], entry["id"] = "closed", "c" + entry["id"]
+            records.append(entry)
+
+    directory = study(edit=rename, threads=[2])
+    prints_three(capsys, directory)
+    assert len(list((directory / "tables").glob("points_*.csv"))) == 2
+    assert all(len(p.name) < 100 for p in (directory / "figures").iterdir())
