@@ -130,6 +130,8 @@ int available_cpus() {
   return std::max(allowed, omp_get_num_procs());
 }
 
+int default_threads() { return std::min(available_cpus(), omp_get_max_threads()); }
+
 std::string openmp_runtime() {
   // Only LLVM's runtime exports the Intel interface; libgomp exports its own.
   if (dlsym(RTLD_DEFAULT, "kmp_get_blocktime")) return "libomp";

@@ -107,7 +107,10 @@ struct ScheduleRegistration {
 /// CPUs that this process may run on (its affinity mask when it started, before any binding of threads).
 int available_cpus();
 
-/// Name and version of the OpenMP runtime that is loaded, e.g. "libgomp" or "libomp".
+/// Threads to use where nobody says how many: all CPUs, or what OMP_NUM_THREADS says if that is fewer.
+int default_threads();
+
+/// Name of the OpenMP runtime that is loaded: "libgomp", "libomp" or "unknown".
 std::string openmp_runtime();
 
 }  // namespace rasterbench

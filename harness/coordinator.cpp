@@ -122,6 +122,7 @@ class Coordinator {
                   const Environment& environment) {
     auto& process = processes[environment];
     if (!process || !process->alive()) {
+      if (running_ == process.get()) running_ = nullptr;
       std::vector<std::string> arguments{"runner"};
       arguments.insert(arguments.end(), options_.benchmark_flags.begin(), options_.benchmark_flags.end());
       process = std::make_unique<Process>(arguments, environment_variables(environment));
@@ -241,7 +242,7 @@ class Coordinator {
       for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random.bits() % i]);
       const auto block_begin = Clock::now();
       for (PointState* state : order) {
-        if (block == 0 ? false : out_of_time()) return stop_for_time();
+        if (block > 0 && out_of_time()) return stop_for_time();  // the first block is taken whole
         show_sampling(block);
         take_sample(*state, block);
       }
@@ -368,7 +369,12 @@ class Coordinator {
 int run_study(const Study& study, const StudyOptions& study_options, const CoordinatorOptions& options) {
   if (study.points.empty()) throw InputError({.file = study.file}, "no point is left to run (filter, shard)");
   catch_interrupts();
-  return Coordinator(study, study_options, options).run();
+  try {
+    return Coordinator(study, study_options, options).run();
+  } catch (const Interrupted&) {
+    throw Interrupted(fmt::format("interrupted; what was measured is in {}: continue with --resume",
+                                  (options.out / "journal.jsonl").string()));
+  }
 }
 
 }  // namespace rasterbench

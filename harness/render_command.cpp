@@ -19,7 +19,9 @@ ExecutionConfig execution_of(const DrawOptions& options) {
   else
     execution.schedule = options.backend == "openmp" ? "dynamic" : options.backend == "tbb" ? "auto" : "";
   const int cpus = available_cpus();
-  execution.threads = options.threads > 0 ? options.threads : options.backend == "serial" ? 1 : cpus;
+  execution.threads = options.threads > 0           ? options.threads
+                      : options.backend == "serial" ? 1
+                                                    : default_threads();
   if (execution.threads > cpus && !options.oversubscribe)
     throw InputError({.field = "--threads"},
                      fmt::format("{} threads on {} CPUs needs --oversubscribe", execution.threads, cpus));
@@ -95,7 +97,8 @@ void add_draw_options(CLI::App& command, DrawOptions& o) {
       "--schedule", o.schedule,
       "KIND[,CHUNK]; see `rasterbench list schedules` (default: dynamic for openmp, auto for tbb)");
   command
-      .add_option("--threads", o.threads, "number of threads (default: all CPUs of this process; serial: 1)")
+      .add_option("--threads", o.threads,
+                  "number of threads (default: all CPUs of this process, or OMP_NUM_THREADS; serial: 1)")
       ->check(CLI::Range(1, 65536));
   command.add_flag("--oversubscribe", o.oversubscribe, "allow more threads than CPUs");
   command.add_option("--size", o.size, "WxH in pixels, each 1 to 65536 (default: the scene's)");

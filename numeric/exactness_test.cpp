@@ -131,15 +131,23 @@ TYPED_TEST(Exactness, EachEdgeIsAHalfLineAlongARow) {
         corners[1].y = y + slope * random.uniform() * std::abs(corners[1].x - corners[0].x);
         if (i % 4 == 0) corners[0].x -= extent;  // the guard band has two sides
       }
+      if (i % 4 == 1) {
+        // A short edge, nearly level, and rows far from it: its line is crossed slowly, by small differences
+        // of large products.
+        corners[1] = {corners[0].x + random.uniform(1, 30), corners[0].y + random.uniform(-0.1, 0.1)};
+        corners[2] = {random.uniform(1, extent), corners[0].y + random.uniform(-0.01, 0.01) * extent};
+      }
       for (const FillRule fill : kFillRules) {
         const auto prepared = prepare<TypeParam>(corners[0], corners[1], corners[2], fill);
-        for (int k = 0; k < 3; ++k) {
-          // About where an edge crosses a row's centres: there the products are nearly equal.
-          const Point &a = corners[static_cast<std::size_t>(k)],
-                      &b = corners[static_cast<std::size_t>((k + 1) % 3)];
-          const int y = static_cast<int>(std::floor(a.y + random.uniform() * (b.y - a.y)));
-          const double s = std::clamp((y + 0.5 - a.y) / (b.y - a.y), 0.0, 1.0);
-          const int x = static_cast<int>(a.x + (b.y != a.y ? s : 0.5) * (b.x - a.x));
+        for (std::size_t k = 0; k < 9; ++k) {
+          // About where the line of an edge crosses the centres of a row, where products are nearly equal: a
+          // row of the edge itself, or one of the triangle that may be far from the edge.
+          const Point &a = corners[k % 3], &b = corners[(k + 1) % 3], &c = corners[(k + 2) % 3];
+          const double to = k < 3 ? b.y : c.y;
+          const int y = static_cast<int>(std::floor(a.y + random.uniform() * (to - a.y)));
+          const double crossing = a.x + (y + 0.5 - a.y) / (b.y - a.y) * (b.x - a.x);
+          if (!(std::abs(crossing) < kGuardBand)) continue;
+          const int x = static_cast<int>(crossing);
           for (int e = 0; e < 3; ++e) {
             const int changes = changes_along_row<TypeParam>(prepared, e, y, x - 300, x + 300);
             ASSERT_LE(changes, 1) << "extent " << extent << ", triangle " << i << ", edge " << e << ", row "

@@ -118,7 +118,7 @@ TEST(Geometry, RejectsWhatMissesTheImage) {
     expect_rejected(t, &GeometryCounts::off_screen);
   }
   // Beyond the shorter side of a picture and within the longer one: 5 to 7 px to the right, or down.
-  const Triangle right{{3, 2, -2}, {5, 2, -2}, {4, 3, -2}}, below{{-3, -2, -2}, {-2, -2, -2}, {-2, -3, -2}};
+  const Triangle right{{3, 2, -2}, {5, 2, -2}, {4, 3, -2}}, below{{-3, -3, -2}, {-2, -3, -2}, {-2, -5, -2}};
   EXPECT_EQ(run_geometry({right}, {}, plain_camera(4, 8)).counts.off_screen, 1);
   EXPECT_EQ(run_geometry({below}, {}, plain_camera(8, 4)).counts.off_screen, 1);
   // A corner of the image is enough to be looked at.
