@@ -1,5 +1,5 @@
-// A non-owning reference to a callable: two words, no allocation; the callable must outlive the call it is
-// passed to.
+// A non-owning reference to a callable object (a lambda; not a plain function): two words, no allocation; the
+// callable must outlive the call it is passed to.
 #pragma once
 
 #include <memory>
