@@ -68,13 +68,20 @@ Study read_study(const std::filesystem::path& file, const StudyOptions& options)
 
   std::set<std::string> names;
   std::vector<std::string> families;
+  std::map<std::string, SceneReference> references;
   for (const Sweep& sweep : sweeps) {
-    for (const SceneReference& reference : sweep.scenes)
-      if (!study.scenes.contains(reference.name)) {
+    for (const SceneReference& reference : sweep.scenes) {
+      const auto [known, is_new] = references.emplace(reference.name, reference);
+      if (known->second.model != reference.model || known->second.parameters != reference.parameters)
+        throw InputError({.file = study.file, .field = "scene"},
+                         fmt::format("two scenes are named '{}': {} and {}", reference.name,
+                                     known->second.model, reference.model));
+      if (is_new) {
         Scene scene = open_scene(reference.model, reference.parameters);
         study.hashes[reference.name] = scene_hash(scene);
         study.scenes.emplace(reference.name, std::move(scene));
       }
+    }
     span_points(sweep, study.scenes, [&](const Point& point) {
       PlannedPoint planned{point, point_name(point), {}};
       if (!names.insert(planned.name).second) return;

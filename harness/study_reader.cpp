@@ -179,13 +179,31 @@ ExecutionConfig checked_execution(const std::string& text) {
   return execution;
 }
 
+/// "MODEL[@SCENE.txt]" or {name = "...", model = "...", parameters = "..."}.
+SceneReference read_scene(const TableReader& sweep, const toml::node& node, const std::string& file) {
+  if (node.is_string()) return parse_scene_reference(*node.value<std::string>());
+  if (!node.is_table())
+    sweep.fail(node, "scene",
+               "must be a string such as \"teapot\" or \"a.dat@a.txt\", or a table with name and model");
+  TableReader reader(*node.as_table(), file);
+  std::string name, model, parameters;
+  reader.text("name", name);
+  reader.text("model", model);
+  reader.text("parameters", parameters);
+  reader.reject_unknown_keys("a scene");
+  if (model.empty()) reader.fail(node, "model", "is missing from this scene");
+  SceneReference scene = parse_scene_reference(parameters.empty() ? model : model + "@" + parameters);
+  if (!name.empty()) scene.name = name;
+  if (scene.name.find('/') != std::string::npos)
+    reader.fail(node, "name", "must not hold a '/': points are named by paths");
+  return scene;
+}
+
 Sweep read_sweep(const toml::table& table, const std::string& file, const std::filesystem::path& folder) {
   Sweep sweep;
   TableReader reader(table, file);
   reader.each("scene", [&](const toml::node& node) {
-    if (!node.is_string())
-      reader.fail(node, "scene", "must be a string such as \"teapot\" or \"a.dat@a.txt\"");
-    sweep.scenes.push_back(relative_to(parse_scene_reference(*node.value<std::string>()), folder));
+    sweep.scenes.push_back(relative_to(read_scene(reader, node, file), folder));
   });
   reader.strings("size", sweep.sizes, [](const std::string& s) { return parse_size(s, "size"); });
   reader.each("kernel", [&](const toml::node& node) {

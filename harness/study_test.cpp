@@ -88,6 +88,19 @@ TEST_F(StudyTest, ErrorsNameLineKeyAndSuggest) {
   EXPECT_EQ(error_of(kSweep + "kernel = []\nexecution = \"serial\"\n"), "5: kernel: is an empty list");
 }
 
+TEST_F(StudyTest, ScenesMayBeNamed) {
+  const std::string rest = "kernel = \"scanline\"\nexecution = \"serial\"\nsize = \"8x8\"\n";
+  const Study study = read("[[sweep]]\nscene = {name = \"pot\", model = \"teapot:triangles=300\"}\n" + rest);
+  EXPECT_EQ(study.points.at(0).name, "pot/8x8/scanline/f32/closed/clip/serial/1");
+  EXPECT_EQ(error_of("[[sweep]]\nscene = {name = \"a/b\", model = \"teapot\"}\n" + rest),
+            "2: name: must not hold a '/': points are named by paths");
+  EXPECT_EQ(error_of("[[sweep]]\nscene = {name = \"a\"}\n" + rest), "2: model: is missing from this scene");
+  const std::string twice =
+      "[[sweep]]\nscene = [{name = \"a\", model = \"teapot:triangles=300\"}, "
+      "{name = \"a\", model = \"teapot:triangles=400\"}]\n";
+  EXPECT_NE(error_of(twice + rest).find("two scenes are named 'a'"), std::string::npos);
+}
+
 TEST_F(StudyTest, FilterAndShardsPartition) {
   const std::string text = kSweep + R"(
 kernel = "all"
