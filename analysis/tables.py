@@ -33,7 +33,7 @@ class Table:
 
 
 def accuracy(record: Record) -> str:
-    """The second verdict: how the picture compares with the exact oracle."""
+    """The second verdict: how the picture compares with an independent renderer."""
     oracle = record.verify.get("oracle")
     if not isinstance(oracle, dict):
         return "not judged"
@@ -235,7 +235,7 @@ def verification(analysis: Analysis) -> Table:
                           | {"points": len(records), "kernels": _kernels(analysis, records)}
                           for key, records in rows.items()])
     return Table("verification", "Verification", "Conforms: the same bits as the scalar specification of the numeric mode."
-                 " Oracle classes count pixels against the exact oracle.", frame, frame.replace({"True": "yes", "False": "NO"}))
+                 " Oracle classes count pixels against the independent double-precision renderer.", frame, frame.replace({"True": "yes", "False": "NO"}))
 
 
 def _kernels(analysis: Analysis, records: list[Record]) -> str:

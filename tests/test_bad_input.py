@@ -261,9 +261,11 @@ def test_folder_without_permission(folder: Path) -> None:
     (["scene", "teapot", "-o", "none/m.dat"], ["none/m.dat", "No such file"]),
     (["scene", "teapot:triangles=300", "-o", "m.dat", "--parameters", "none/m.txt"], ["none/m.txt", "No such file"]),
     (["study"], ["FILE"]),
-    (["--bogus"], ["--bogus"]),
+    (["--bogus"], []),
     (["two\nlines"], ["two"]),
     (["render", "two\nlines.dat"], ["two"]),
+    (["render", "good.dat", "good.txt", "two\nlines"], ["two"]),
+    (["render", "good.dat", "--threads", "1\n2"], ["--threads"]),
 ], ids=lambda value: " ".join(value).replace("\n", "\\n") or "nothing")
 def test_bad_usage(arguments: list[str], words: list[str], folder: Path) -> None:
     refuse_in(folder, arguments, *words)

@@ -1,0 +1,341 @@
+"""What a study writes: one study that holds every kind of point, checked against harness/records.md."""
+
+from __future__ import annotations
+
+import json
+import re
+import statistics
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+import pytest
+from scipy.stats import binom
+
+from .program import CPUS, events, read_png, records, run, sampling, snapshot, sweep, write_study
+
+Record = dict[str, Any]
+STAGES = ["clear", "geometry", "raster", "resolve"]
+SMALL = "teapot:triangles=300"
+LIBOMP = any(Path(p).exists() for p in ("/usr/lib/x86_64-linux-gnu/libomp.so.5", "/usr/lib/aarch64-linux-gnu/libomp.so.5",
+                                        "/usr/lib64/libomp.so", "/usr/lib/libomp.so"))
+needs_two_cpus = pytest.mark.skipif(CPUS < 2, reason="this machine has one CPU")
+
+
+class Study:
+    """A finished study: its folder, exit code and records."""
+
+    def __init__(self, folder: Path, *tables: str, options: tuple[object, ...] = (), **variables: str) -> None:
+        self.folder = folder / "out"
+        self.outcome = run("study", write_study(folder / "study.toml", 'name = "small"\nquestion = "Does it work?"\nseed = 5', *tables),
+                           "--out", self.folder, *options, **variables)
+        assert self.outcome.code in (0, 1), self.outcome.stderr
+        self.records = records(self.folder)
+        self.context = json.loads((self.folder / "context.json").read_text())
+
+    def where(self, **axes: Any) -> list[Record]:
+        return [r for r in self.records if all(r["config"][axis] == value for axis, value in axes.items())]
+
+    def the(self, **axes: Any) -> Record:
+        (record,) = self.where(**axes)
+        return record
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory: pytest.TempPathFactory) -> Study:
+    """Only points that can run; 60 samples of each, so that there is a 95th percentile."""
+    return Study(tmp_path_factory.mktemp("good"), sampling(60),
+                 sweep(["tile_parallel", "triangle_atomics", "scanline"], ["serial", "openmp:dynamic,4", "tbb:auto"], threads=[1, min(2, CPUS)]),
+                 options=("--benchmark_context=a=b,site=here",))
+
+
+@pytest.fixture(scope="module")
+def mixed(tmp_path_factory: pytest.TempPathFactory) -> Study:
+    """Points that run, fail and are skipped, in several environments."""
+    many = ["openmp:dynamic", "tbb:auto"]
+    return Study(tmp_path_factory.mktemp("mixed"), sampling(6, 8, point_seconds=5),
+                 sweep(["tile_parallel", "triangle_atomics"], "serial", numeric=["f32", "f64", "fixed_8"], fill=["closed", "top-left"]),
+                 sweep("all_pixels", "serial", scene="confetti:triangles=20000", size="1000x1000"),
+                 sweep("row_parallel", "openmp:static", threads=[1, CPUS + 1]),
+                 sweep("null", "serial"),
+                 sweep("row_parallel", many, threads=1, binding=["close", "spread"]),
+                 sweep("row_parallel", many, threads=1, wait_policy=["active", "passive"]),
+                 sweep("row_parallel", many, threads=1, runtime="libomp"),
+                 sweep("tile_parallel", "serial", near="off", tile=[16, 32]),
+                 sweep("scanline", "serial", cache=["warm", "cold"]))
+
+
+@pytest.fixture(params=["good", "mixed"])
+def study(request: pytest.FixtureRequest) -> Study:
+    return request.getfixturevalue(request.param)
+
+
+# The schema.
+
+NUMBER, TEXT, LIST, WHOLE = (int, float), str, list, int
+NULL = type(None)
+CONFIG = {"scene": TEXT, "scene_hash": TEXT, "size": LIST, "kernel": TEXT, "numeric": TEXT, "fill": TEXT, "near": TEXT, "backend": TEXT,
+          "schedule": (TEXT, NULL), "chunk": (WHOLE, NULL), "threads": WHOLE, "binding": TEXT, "wait_policy": TEXT, "runtime": TEXT,
+          "tile": (WHOLE, NULL), "isa": TEXT, "output": TEXT, "cache": TEXT}
+RECORD = {"schema": WHOLE, "id": TEXT, "name": TEXT, "config": dict, "status": TEXT, "launches": LIST, "blocks": LIST, "frames_per_sample": WHOLE,
+          "samples_ms": LIST, "stages_ms": dict, "median_ms": (*NUMBER, NULL), "interval_ms": (LIST, NULL), "p95_ms": (*NUMBER, NULL),
+          "min_ms": (*NUMBER, NULL), "max_ms": (*NUMBER, NULL), "stop": (TEXT, NULL), "verify": (dict, NULL), "work": (dict, NULL),
+          "threads_observed": (WHOLE, NULL), "per_thread": LIST, "context": TEXT}
+VERIFY = {"conforms": bool, "checked_against": TEXT, "differing_pixels": WHOLE, "oracle": dict, "embree": NULL}
+ORACLE = {"renderer": TEXT, "identical": WHOLE, "edge_ties": WHOLE, "depth_ties": WHOLE, "errors": WHOLE, "max_depth_error_steps": NUMBER,
+          "within_bound": bool}
+WORK = {"triangles": WHOLE, "drawn": WHOLE, "pieces": WHOLE, "rejected": dict, "near_clipped": WHOLE, "guard_clipped": WHOLE,
+        "covered_pixels": WHOLE, "bytes": WHOLE}
+REJECTED = dict.fromkeys(["non_finite", "zero_area", "behind_near", "beyond_far", "off_screen", "back_facing"], WHOLE)
+CONTEXT = {"schema": WHOLE, "id": TEXT, "started": TEXT, "finished": TEXT, "program": dict, "libraries": dict, "machine": dict,
+           "environment": dict, "study": dict, "region": TEXT, "custom": dict, "points": dict, "images": dict}
+MACHINE = {"hostname": TEXT, "cpu": TEXT, "cpus_online": WHOLE, "cpus_allowed": LIST, "cores": WHOLE, "packages": WHOLE, "numa_nodes": WHOLE,
+           "smt": bool, "caches": LIST, "memory_bytes": WHOLE, "governor": TEXT, "load_average": TEXT, "kernel": TEXT, "virtualisation": TEXT}
+
+
+def obey(value: dict[str, Any], schema: dict[str, Any], what: str, optional: tuple[str, ...] = ()) -> None:
+    assert set(value) - set(optional) == set(schema), what
+    for key, kind in schema.items():
+        good = isinstance(value[key], kind) and (kind is not WHOLE or not isinstance(value[key], bool))
+        assert good, f"{what}: {key} is {value[key]!r}"
+
+
+def test_records_have_the_documented_keys_and_types(study: Study) -> None:
+    for r in study.records:
+        obey(r, RECORD, r["name"], optional=("reason", "counters"))
+        obey(r["config"], CONFIG, r["name"])
+        assert r["schema"] == 1 and re.fullmatch("[0-9a-f]{32}", r["id"]) and re.fullmatch("[0-9a-f]{32}", r["config"]["scene_hash"])
+        assert r["context"] == study.context["id"]
+        assert ("reason" in r) == (r["status"] != "ok") and r.get("reason") != ""
+        assert list(r["stages_ms"]) == STAGES
+        if r["verify"] is not None:
+            obey(r["verify"], VERIFY, r["name"])
+            obey(r["verify"]["oracle"], ORACLE, r["name"])
+            obey(r["work"], WORK, r["name"])
+            obey(r["work"]["rejected"], REJECTED, r["name"])
+    assert len({r["id"] for r in study.records}) == len({r["name"] for r in study.records}) == len(study.records)
+
+
+def test_config_values(study: Study) -> None:
+    for r in study.records:
+        c = r["config"]
+        assert c["fill"] in ("closed", "top-left") and c["near"] in ("clip", "off") and c["cache"] in ("warm", "cold")
+        assert c["output"] == "rgba8+f32" and len(c["size"]) == 2 and all(isinstance(side, int) for side in c["size"])
+        assert (c["schedule"] is None) == (c["backend"] == "serial") and (c["tile"] is None) == (c["kernel"] != "tile_parallel")
+        schedule = c["backend"] + (f":{c['schedule']}" if c["schedule"] else "") + (f",{c['chunk']}" if c["chunk"] else "")
+        parts = [c["scene"], f"{c['size'][0]}x{c['size'][1]}", c["kernel"], c["numeric"], c["fill"], c["near"], schedule, str(c["threads"])]
+        for key, label, usual in (("binding", "binding", "none"), ("wait_policy", "wait", "default"), ("runtime", "runtime", "default"),
+                                  ("tile", "tile", 64), ("cache", "cache", "warm")):
+            if c[key] not in (usual, None):
+                parts.append(f"{label}:{c[key]}")
+        assert r["name"] == "/".join(parts)
+
+
+def interval(samples: list[float]) -> list[float] | None:
+    """Order statistics k and n+1-k with the largest k that leaves at most 2.5 % on each side."""
+    n, k = len(samples), 0
+    while binom.cdf(k, n, 0.5) <= 0.025:
+        k += 1
+    return [sorted(samples)[k - 1], sorted(samples)[n - k]] if k else None
+
+
+def test_statistics_are_those_of_the_samples(study: Study) -> None:
+    timed = [r for r in study.records if r["status"] == "ok"]
+    assert timed
+    for r in timed:
+        times = r["samples_ms"]
+        assert len(times) == len(r["launches"]) == len(r["blocks"]) == len(r["stages_ms"]["raster"]) >= 6
+        assert min(times) > 0 and r["frames_per_sample"] >= 1
+        assert r["median_ms"] == pytest.approx(statistics.median(times), rel=1e-12)
+        assert r["interval_ms"] == interval(times)
+        assert (r["min_ms"], r["max_ms"]) == (min(times), max(times))
+        assert r["p95_ms"] == (sorted(times)[-(-95 * len(times) // 100) - 1] if len(times) >= 59 else None)
+        for i, total in enumerate(times):  # stages are parts of a sample
+            assert sum(r["stages_ms"][s][i] for s in STAGES if r["stages_ms"][s] is not None) <= total * 1.0001
+
+
+def test_points_without_a_verdict_show_no_speed(mixed: Study) -> None:
+    untimed = [r for r in mixed.records if r["status"] != "ok"]
+    assert {r["status"] for r in untimed} == {"failed", "skipped"}
+    for r in untimed:
+        assert r["samples_ms"] == r["launches"] == r["blocks"] == r["per_thread"] == []
+        assert all(r[key] is None for key in ("median_ms", "interval_ms", "p95_ms", "min_ms", "max_ms", "stop"))
+        assert all(not r["stages_ms"][s] for s in STAGES)
+
+
+def test_good_points_are_verified(study: Study) -> None:
+    for r in (r for r in study.records if r["status"] == "ok"):
+        v, o, w = r["verify"], r["verify"]["oracle"], r["work"]
+        assert v["conforms"] and v["differing_pixels"] == 0 and o["within_bound"] and o["errors"] == 0
+        assert o["identical"] + o["edge_ties"] + o["depth_ties"] == r["config"]["size"][0] * r["config"]["size"][1]
+        assert 0 < w["drawn"] <= w["triangles"] and w["covered_pixels"] > 100 and w["bytes"] > 0
+        assert w["drawn"] + sum(w["rejected"].values()) == w["triangles"]
+        assert r["threads_observed"] == r["config"]["threads"] == len(r["per_thread"])
+        for worker in r["per_thread"]:
+            assert set(worker) == {"busy_ms", "iterations", "cpu"} and worker["busy_ms"] >= 0 and worker["iterations"] >= 0
+
+
+def test_context_has_the_documented_keys(study: Study) -> None:
+    c = study.context
+    obey(c, CONTEXT, "context.json")
+    obey(c["machine"], MACHINE, "machine")
+    assert {"version", "commit", "dirty", "compiler", "flags", "build_type"} <= set(c["program"]) and isinstance(c["program"]["dirty"], bool)
+    assert {"google_benchmark", "tbb", "openmp"} <= set(c["libraries"])
+    assert all(set(cache) == {"level", "size_bytes", "shared_by"} for cache in c["machine"]["caches"])
+    s = c["study"]
+    assert (s["name"], s["question"], s["seed"], s["shard"]) == ("small", "Does it work?", 5, "1/1")
+    assert s["text"] == (study.folder.parent / "study.toml").read_text() and s["file"].endswith("study.toml") and s["hash"]
+    assert set(s["sampling"]) == {"target", "min_samples", "max_samples", "point_seconds", "launches", "time_limit_s"}
+    for key in ("started", "finished"):
+        assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ", c[key])
+    assert c["started"] <= c["finished"]
+    counts = {status: sum(r["status"] == status for r in study.records) for status in ("ok", "skipped", "failed")}
+    assert c["points"] == {"planned": len(study.records), "run": counts["ok"], "skipped": counts["skipped"], "failed": counts["failed"]}
+    assert study.outcome.code == (1 if counts["failed"] else 0)
+
+
+def test_custom_context(good: Study, mixed: Study) -> None:
+    assert good.context["custom"] == {"a": "b", "site": "here"} and mixed.context["custom"] == {}
+
+
+def test_pictures_of_the_scenes(study: Study) -> None:
+    for scene, file in study.context["images"].items():
+        assert scene == SMALL
+        image = read_png(study.folder / file)
+        assert image.shape == (48, 64, 3) and image.std() > 10
+    assert len(study.context["images"]) == 1
+
+
+# Order and completeness of the journal.
+
+def test_blocks_are_complete_and_in_random_order(study: Study) -> None:
+    """In each block every point that is not finished has exactly one sample; finished ones only as bases of others."""
+    timed = {r["id"]: r for r in study.records if r["status"] == "ok"}
+    finished: set[str] = set()
+    orders: list[list[str]] = []
+    stream = [e for kind in ("sample", "stop") for e in events(study.folder, kind)]
+    assert len(stream) > 0
+    from_journal = [e for e in map(json.loads, (study.folder / "journal.jsonl").read_text().splitlines())
+                    if e["event"] in ("sample", "stop")]
+    for kind, group in groupby(from_journal, key=lambda e: (e["event"], e.get("block"))):
+        ids = [e["id"] for e in group]
+        if kind[0] == "stop":
+            finished.update(ids)
+            continue
+        assert kind[1] == len(orders), "blocks are numbered in order and not interleaved"
+        assert len(ids) == len(set(ids)), "a point twice in a block"
+        assert set(timed) - finished <= set(ids), "an open point was left out"
+        for extra in set(ids) & finished:
+            assert timed[extra]["config"]["threads"] == 1
+        orders.append(ids)
+    assert finished == set(timed)
+    assert len({tuple(order) for order in orders}) > len(orders) / 2
+    assert len({order[0] for order in orders}) > 2
+
+
+def test_records_repeat_the_journal(study: Study) -> None:
+    taken: dict[str, list[Record]] = {}
+    for e in events(study.folder, "sample"):
+        taken.setdefault(e["id"], []).append(e)
+    for r in (r for r in study.records if r["status"] == "ok"):
+        mine = taken[r["id"]]
+        assert [e["answer"]["ms"] for e in mine] == r["samples_ms"] and [e["block"] for e in mine] == r["blocks"]
+        assert [e["launch"] for e in mine] == r["launches"]
+        (stop,) = [e["reason"] for e in events(study.folder, "stop") if e["id"] == r["id"]]
+        assert stop == r["stop"]
+
+
+def test_stopping(good: Study, mixed: Study) -> None:
+    assert all(r["stop"] in ("target", "max_samples") and len(r["samples_ms"]) == 60 for r in good.records)
+    for r in (r for r in mixed.records if r["status"] == "ok"):
+        assert r["stop"] in ("target", "max_samples") and 6 <= len(r["samples_ms"])
+
+
+# What fails and what is skipped.
+
+def test_null_kernel_fails(mixed: Study) -> None:
+    r = mixed.the(kernel="null")
+    assert r["status"] == "failed" and "pixels differ" in r["reason"]
+    assert r["verify"]["conforms"] is False and r["verify"]["differing_pixels"] > 100
+    assert mixed.outcome.code == 1
+    assert any("FAILED" in line and "/null/" in line for line in mixed.outcome.errors)
+    assert [r["kernel"] for r in map(lambda r: r["config"], mixed.records) if r["kernel"] == "null"] == ["null"]
+
+
+def test_null_kernel_is_hidden(good: Study, tmp_path: Path) -> None:
+    assert '"null"' not in run("list", "kernels", "--json").ok().stdout
+    every = write_study(tmp_path / "all.toml", sweep("all", "serial"))
+    assert "/null/" not in run("study", every, "--list").ok().stdout
+
+
+@pytest.mark.parametrize("axes, words", [
+    ({"kernel": "triangle_atomics", "numeric": "f64", "fill": "closed"}, ["triangle_atomics", "f64"]),
+    ({"kernel": "all_pixels"}, ["predicted cost", " s ", "time limit of 5 s"]),
+    ({"threads": CPUS + 1}, [f"{CPUS + 1} threads on {CPUS} CPUs", "--oversubscribe"]),
+    ({"backend": "tbb", "binding": "close"}, ["oneTBB"]),
+    ({"backend": "tbb", "wait_policy": "passive"}, ["OpenMP"]),
+    ({"backend": "tbb", "runtime": "libomp"}, ["OpenMP"]),
+], ids=lambda value: " ".join(map(str, value.values())) if isinstance(value, dict) else "")
+def test_skipped_with_a_reason(axes: dict[str, Any], words: list[str], mixed: Study) -> None:
+    r = mixed.the(**axes)
+    assert r["status"] == "skipped" and all(word in r["reason"] for word in words), r["reason"]
+
+
+@pytest.mark.parametrize("axes", [{"binding": "close"}, {"binding": "spread"}, {"wait_policy": "active"}, {"wait_policy": "passive"},
+                                  {"near": "off", "tile": 16}, {"near": "off", "tile": 32}, {"cache": "cold"}, {"threads": 1, "kernel": "row_parallel",
+                                  "binding": "none", "wait_policy": "default", "runtime": "default"}], ids=str)
+def test_axes_that_run(axes: dict[str, Any], mixed: Study) -> None:
+    (r,) = [r for r in mixed.where(**axes) if r["config"]["backend"] != "tbb"]
+    assert r["status"] == "ok", r.get("reason")
+
+
+def test_other_openmp_runtime(mixed: Study) -> None:
+    r = mixed.the(runtime="libomp", backend="openmp")
+    assert r["status"] == ("ok" if LIBOMP else "skipped")
+    assert LIBOMP or "libomp" in r["reason"]
+
+
+@needs_two_cpus
+def test_fewer_threads_than_asked_for(tmp_path: Path) -> None:
+    study = Study(tmp_path, sampling(), sweep("row_parallel", ["serial", "openmp:dynamic"], threads=[1, 2]), OMP_THREAD_LIMIT="1")
+    assert study.outcome.code == 1
+    r = study.the(threads=2)
+    assert r["status"] == "failed" and r["reason"] == "1 of 2 threads ran" and r["threads_observed"] == 1
+    assert all(r["status"] == "ok" for r in study.where(threads=1)) and len(study.where(threads=1)) == 2
+    assert study.context["environment"]["OMP_THREAD_LIMIT"] == "1"
+
+
+def test_oversubscribed(tmp_path: Path) -> None:
+    study = Study(tmp_path, sampling(), sweep("row_parallel", ["openmp:static", "tbb:auto"], threads=CPUS + 1), options=("--oversubscribe",))
+    assert study.outcome.code == 0
+    assert [r["threads_observed"] for r in study.records] == [CPUS + 1] * 2
+
+
+def test_launches_alternate(tmp_path: Path) -> None:
+    study = Study(tmp_path, sampling(8, launches=2), sweep("row_parallel", ["serial", "openmp:static"], threads=1, binding=["none", "close"]))
+    assert study.outcome.code == 0
+    for r in (r for r in study.records if r["status"] == "ok"):
+        assert r["blocks"] == list(range(8)) and r["launches"] == [0, 1] * 4
+
+
+def test_time_limit_leaves_at_least_one_sample(tmp_path: Path) -> None:
+    study = Study(tmp_path, sampling(5000), sweep("row_parallel", ["serial", "openmp:static"], size="400x300", threads=1), options=("--time-limit", 1))
+    assert study.outcome.code == 0
+    for r in study.records:
+        assert (r["status"], r["stop"]) == ("ok", "time_limit") and 1 <= len(r["samples_ms"]) < 5000
+
+
+def test_study_runs_on_other_scenes_and_sizes(tmp_path: Path) -> None:
+    run("scene", "terrain:triangles=500", "-o", tmp_path / "land.dat", "--parameters", tmp_path / "view.txt").ok()
+    study = Study(tmp_path, sampling(), sweep(), options=("--scene", f"{tmp_path}/land.dat@{tmp_path}/view.txt", "--size", "50x40", "--size", "40x30"))
+    assert [(r["config"]["scene"], r["config"]["size"]) for r in study.records] == [("land@view", [50, 40]), ("land@view", [40, 30])]
+
+
+def test_same_id_for_the_same_point_and_build(tmp_path: Path, good: Study) -> None:
+    again = Study(tmp_path, sampling(), sweep(["tile_parallel"], "serial"), sweep("tile_parallel", "serial", size="65x48"))
+    same, other = again.records
+    assert same["id"] == good.the(kernel="tile_parallel", backend="serial")["id"] != other["id"]
+
+
+def test_nothing_but_the_documented_files(study: Study) -> None:
+    assert {path.split("/")[0] for path in snapshot(study.folder)} - {".lock"} == {"context.json", "records.jsonl", "journal.jsonl", "images"}
