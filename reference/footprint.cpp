@@ -248,7 +248,7 @@ bool may_lack_world_area(const Triangle& t) {
 // distance to it.
 Polygon visible_part(const std::array<Corner, 3>& corners, double near_side, NearRule near_rule,
                      const ModeBound& bound) {
-  const auto& [a, b, c] = corners;
+  const Corner &a = corners[0], &b = corners[1], &c = corners[2];
   std::vector<Weights> weights = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   const auto clip = [&](auto value) { weights = clipped(weights, {value(a), value(b), value(c)}); };
   if (near_rule == NearRule::kClip)

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from scipy.stats import binom
 
-from .program import CPUS, events, read_png, records, run, sampling, snapshot, sweep, write_study
+from .program import CPUS, events, json_lines, read_png, records, run, sampling, snapshot, sweep, write_study
 
 Record = dict[str, Any]
 STAGES = ["clear", "geometry", "raster", "resolve"]
@@ -213,11 +213,8 @@ def test_blocks_are_complete_and_in_random_order(study: Study) -> None:
     timed = {r["id"]: r for r in study.records if r["status"] == "ok"}
     finished: set[str] = set()
     orders: list[list[str]] = []
-    stream = [e for kind in ("sample", "stop") for e in events(study.folder, kind)]
-    assert len(stream) > 0
-    from_journal = [e for e in map(json.loads, (study.folder / "journal.jsonl").read_text().splitlines())
-                    if e["event"] in ("sample", "stop")]
-    for kind, group in groupby(from_journal, key=lambda e: (e["event"], e.get("block"))):
+    journal = [e for e in json_lines(study.folder / "journal.jsonl") if e["event"] in ("sample", "stop")]
+    for kind, group in groupby(journal, key=lambda e: (e["event"], e.get("block"))):
         ids = [e["id"] for e in group]
         if kind[0] == "stop":
             finished.update(ids)
