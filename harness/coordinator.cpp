@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <chrono>
 #include <memory>
+#include <set>
 
 #include "base/error.h"
 #include "base/hash.h"
@@ -69,11 +70,13 @@ class Coordinator {
     const std::string build = build_id();
     states_ = initial_states(study_, build);
     const Json start = start_event(study_, states_, build);
-    prepare_folder();
-    const FolderLock lock(options_.out);
+    const auto lock = prepare_folder();
     const auto journal_path = options_.out / "journal.jsonl";
-    const bool resumed = options_.resume && std::filesystem::exists(journal_path);
-    if (resumed) replay(read_journal(journal_path), start, journal_path, states_);
+    // A journal without one complete line is that of a study that was killed before it did anything.
+    const std::vector<Json> events =
+        std::filesystem::exists(journal_path) ? read_journal(journal_path) : std::vector<Json>{};
+    const bool resumed = !events.empty();
+    if (resumed) replay(events, start, journal_path, states_);
     journal_ = std::make_unique<Journal>(journal_path);
     Json event = resumed ? Json{{"event", "resume"}} : start;
     event["at"] = utc_now();
@@ -87,23 +90,30 @@ class Coordinator {
   }
 
  private:
-  void prepare_folder() {
-    const auto& out = options_.out;
-    std::error_code error;
-    const bool holds_study = std::filesystem::exists(out / "journal.jsonl", error);
-    if (holds_study && !options_.resume && !options_.replace)
-      throw InputError({.file = out.string(), .field = "--out"},
+  /// Makes the folder and locks it, before anything in it is looked at; the lock lasts as long as what is
+  /// returned.
+  std::unique_ptr<FolderLock> prepare_folder() {
+    auto lock = make_and_lock(options_.out);
+    if (!std::filesystem::exists(options_.out / "journal.jsonl")) return lock;
+    if (!options_.resume && !options_.replace)
+      throw InputError({.file = options_.out.string(), .field = "--out"},
                        "holds a study already; add --resume to continue it or --replace to start afresh");
-    if (holds_study && options_.replace) {
-      const std::filesystem::path previous = out.string() + ".previous";
-      std::filesystem::remove_all(previous, error);
-      std::filesystem::rename(out, previous, error);
-      if (error) throw InputError({.file = out.string(), .field = "--replace"}, error.message());
-    }
-    std::filesystem::create_directories(out, error);
-    if (error || !std::filesystem::is_directory(out))
-      throw InputError({.file = out.string(), .field = "--out"},
+    if (options_.resume) return lock;
+    std::error_code error;
+    const std::filesystem::path previous = options_.out.string() + ".previous";
+    std::filesystem::remove_all(previous, error);
+    std::filesystem::rename(options_.out, previous, error);  // its lock goes with it
+    if (error) throw InputError({.file = options_.out.string(), .field = "--replace"}, error.message());
+    return make_and_lock(options_.out);
+  }
+
+  static std::unique_ptr<FolderLock> make_and_lock(const std::filesystem::path& folder) {
+    std::error_code error;
+    std::filesystem::create_directories(folder, error);
+    if (error || !std::filesystem::is_directory(folder))
+      throw InputError({.file = folder.string(), .field = "--out"},
                        "cannot be made: " + (error ? error.message() : "not a folder"));
+    return std::make_unique<FolderLock>(folder);
   }
 
   double elapsed() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
@@ -166,22 +176,38 @@ class Coordinator {
     }
   }
 
-  /// A picture of each scene for the report, by the first point of it that passed.
+  /// A picture of each scene for the report, by the first point of it that passed. A side matter: what goes
+  /// wrong is said and costs the picture, not the point.
   void draw_images(Json& context) {
     Json& images = context["images"] = Json::object();
+    std::set<std::string> files;
     for (PointState& state : states_) {
       const std::string& scene = state.planned->point.scene.name;
       if (!state.timed() || state.judgement.is_null() || images.contains(scene)) continue;
-      std::string file = scene;
-      for (char& c : file)
+      std::string stem = scene;
+      for (char& c : stem)
         if (!std::isalnum(static_cast<unsigned char>(c)) && c != '-' && c != '_' && c != '.') c = '_';
-      const std::string path = fmt::format("images/{}.png", file);
-      std::filesystem::create_directories(options_.out / "images");
-      const Json request{{"op", "image"},
-                         {"point", point_to_json(state.planned->point)},
-                         {"path", (options_.out / path).string()}};
-      ask_verifier(state, request, [&](const Json&) { images[scene] = path; });
+      std::string file = fmt::format("images/{}.png", stem);
+      for (int copy = 2; !files.insert(file).second; ++copy)
+        file = fmt::format("images/{}_{}.png", stem, copy);
+      try {
+        std::filesystem::create_directories(options_.out / "images");
+        runner(verifiers_, state.planned->point.environment)
+            .ask({{"op", "image"},
+                  {"point", point_to_json(state.planned->point)},
+                  {"path", (options_.out / file).string()}},
+                 kSampleTimeout);
+        images[scene] = file;
+      } catch (const ProcessError& error) {
+        images[scene] = nullptr;
+        progress_.note(fmt::format("no picture of {}: {}", scene, error.what()));
+      } catch (const std::filesystem::filesystem_error& error) {
+        images[scene] = nullptr;
+        progress_.note(fmt::format("no picture of {}: {}", scene, error.what()));
+      }
     }
+    for (auto image = images.begin(); image != images.end();)
+      image = image->is_null() ? images.erase(image) : image + 1;
     verifiers_.clear();
   }
 
@@ -325,7 +351,7 @@ class Coordinator {
       ++(skip ? skipped : ok ? run : failed);
     }
     context["points"] = {{"planned", states_.size()}, {"run", run}, {"skipped", skipped}, {"failed", failed}};
-    const std::string id = hash_bytes(context.dump());
+    const std::string id = hash_bytes(dump(context));
     Json whole;
     whole["schema"] = context.at("schema");
     whole["id"] = id;
@@ -336,12 +362,16 @@ class Coordinator {
     std::vector<Json> records;
     for (const PointState& state : states_) {
       records.push_back(make_record(state, study_, id));
-      lines += records.back().dump() + "\n";
+      lines += dump(records.back()) + "\n";
     }
-    write_file(options_.out / "context.json", whole.dump(2) + "\n");
-    write_file(options_.out / "records.jsonl", lines);
-    if (!options_.benchmark_out.empty())
-      write_file(options_.benchmark_out, google_benchmark_report(records, options_.benchmark_out_format));
+    try {
+      write_file(options_.out / "context.json", dump(whole, 2) + "\n");
+      write_file(options_.out / "records.jsonl", lines);
+      if (!options_.benchmark_out.empty())
+        write_file(options_.benchmark_out, google_benchmark_report(records, options_.benchmark_out_format));
+    } catch (const InputError& error) {  // nothing is lost: all of it is made from the journal
+      throw Error(std::string(error.what()) + "; continue with --resume");
+    }
     progress_.note("");
     if (options_.benchmark_format.empty())
       fmt::print("{}\n", summary_table(states_));

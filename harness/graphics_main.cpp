@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 
+#include "base/error.h"
 #include "build_info.h"
 #include "harness/commands.h"
 
@@ -24,8 +25,7 @@ int run(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);
-    fmt::print(stderr, "graphics: {}; see --help\n", error.what());
-    return 2;
+    throw InputError(std::string(error.what()) + "; see --help");
   }
   if (drawing.image.empty()) drawing.image = std::filesystem::path(drawing.model).stem().string() + ".ppm";
   draw(drawing, {});

@@ -39,7 +39,7 @@ Journal::~Journal() {
 }
 
 void Journal::append(const Json& event) {
-  const std::string line = event.dump() + "\n";
+  const std::string line = dump(event) + "\n";
   std::size_t written = 0;
   while (written < line.size()) {
     const ssize_t n = write(file_, line.data() + written, line.size() - written);

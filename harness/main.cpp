@@ -36,6 +36,7 @@ int run(int argc, char** argv) {
   add_list_command(app);
   add_scene_command(app);
   add_runner_command(app, outcome, benchmark_flags);
+  for (CLI::App* command : app.get_subcommands({})) command->set_version_flag("--version", version);
   try {
     app.parse(arguments);
   } catch (const CLI::ParseError& error) {
@@ -46,8 +47,7 @@ int run(int argc, char** argv) {
       known.push_back(command->get_name());
     if (app.get_subcommands().empty() && argc > 1 && argv[1][0] != '-')
       throw InputError(unknown_name("command", argv[1], known));
-    fmt::print(stderr, "rasterbench: {}; see --help\n", error.what());
-    return 2;
+    throw InputError(std::string(error.what()) + "; see --help");
   }
   return outcome.exit_code;
 }

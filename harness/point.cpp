@@ -30,8 +30,9 @@ constexpr int kMaxChunk = 1 << 30;
 
 SceneReference parse_scene_reference(const std::string& text) {
   const auto at = text.find('@');
-  SceneReference scene{text.substr(0, at), text.substr(0, at),
-                       at == std::string::npos ? "" : text.substr(at + 1)};
+  SceneReference scene;
+  scene.name = scene.model = text.substr(0, at);
+  if (at != std::string::npos) scene.parameters = text.substr(at + 1);
   if (const std::filesystem::path model(scene.model);
       model.has_extension() && scene.model.find(':') == std::string::npos) {
     scene.name = model.stem().string();
@@ -39,6 +40,10 @@ SceneReference parse_scene_reference(const std::string& text) {
     if (!view.empty() && view != scene.name) scene.name += "@" + view;
   }
   return scene;
+}
+
+std::string dump(const Json& json, int indent) {
+  return json.dump(indent, ' ', false, Json::error_handler_t::replace);
 }
 
 FrameSettings Point::settings() const {
@@ -94,7 +99,7 @@ Json point_to_json(const Point& p) {
 
 Point point_from_json(const Json& json) {
   Point p;
-  p.scene = {json.at("scene"), json.at("model"), json.at("parameters")};
+  p.scene = {.name = json.at("scene"), .model = json.at("model"), .parameters = json.at("parameters")};
   p.width = json.at("size").at(0);
   p.height = json.at("size").at(1);
   p.kernel = json.at("kernel");

@@ -17,6 +17,7 @@ struct SceneReference {
   std::string name;        ///< short label, unique in the study
   std::string model;       ///< MODEL: a path or a generator's specification
   std::string parameters;  ///< SCENE.txt, or empty
+  std::int64_t line = 0;   ///< of the study file that names it; 0: the command line
 };
 
 /// "MODEL" or "MODEL@SCENE.txt"; the label is the generator's specification or the files' stems.
@@ -39,6 +40,9 @@ inline const std::vector<std::string> kRuntimes{"default", "libomp"};
 inline const std::vector<std::string> kFillRules{"closed", "top-left"};
 inline const std::vector<std::string> kNearRules{"clip", "off"};
 inline const std::vector<std::string> kCaches{"warm", "cold"};
+
+/// The text of `json`; bytes that are not UTF-8 (file names may hold any) are replaced, never an error.
+std::string dump(const Json& json, int indent = -1);
 
 struct Point {
   SceneReference scene;

@@ -121,7 +121,7 @@ std::string Process::read_line(double timeout_seconds) {
 
 Json Process::ask(const Json& request, double timeout_seconds) {
   if (interrupted) throw Interrupted("interrupted");
-  const std::string line = request.dump() + "\n";
+  const std::string line = dump(request) + "\n";
   for (std::size_t written = 0; written < line.size();) {
     const ssize_t n = write(to_child_, line.data() + written, line.size() - written);
     if (n < 0 && errno == EINTR) continue;

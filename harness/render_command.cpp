@@ -31,6 +31,8 @@ ExecutionConfig execution_of(const DrawOptions& options) {
 void draw(const Drawing& drawing, const DrawOptions& options) {
   // Everything that can be wrong with the arguments is found before the model is read.
   if (!drawing.image.empty()) check_image_path(drawing.image);
+  for (const std::string& file : {drawing.image, drawing.ids, drawing.depth})
+    if (!file.empty()) check_output_path(file);
   FrameSettings settings;
   settings.fill = parse_fill(options.fill, "--fill");
   settings.geometry.near_rule = parse_near(options.near_rule, "--near");

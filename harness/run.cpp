@@ -46,7 +46,7 @@ std::vector<PointState> initial_states(const Study& study, const std::string& bu
     PointState state;
     state.planned = &planned;
     state.id =
-        hash_bytes(point_config(planned.point).dump() + study.hashes.at(planned.point.scene.name) + build);
+        hash_bytes(dump(point_config(planned.point)) + study.hashes.at(planned.point.scene.name) + build);
     state.skip = planned.skip;
     states.push_back(std::move(state));
   }

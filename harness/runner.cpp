@@ -164,7 +164,7 @@ int run_runner(const std::vector<std::string>& benchmark_flags) {
       answer = Json::object();
       answer["error"] = error.what();
     }
-    std::cout << answer.dump() << std::endl;  // flushed: the coordinator waits for it
+    std::cout << dump(answer) << std::endl;  // flushed: the coordinator waits for it
   }
   return 0;
 }

@@ -3,6 +3,7 @@
 #include "harness/commands.h"
 #include "scene/dat.h"
 #include "scene/generator.h"
+#include "scene/image.h"
 
 namespace rasterbench {
 
@@ -17,6 +18,8 @@ void add_scene_command(CLI::App& app) {
   command->add_option("--parameters", *parameters,
                       "also write the scene's camera and colours to this SCENE.txt");
   command->callback([specification, output, parameters] {
+    for (const std::string& file : {*output, *parameters})
+      if (!file.empty()) check_output_path(file);
     const Scene scene = generate(*specification);
     write_dat(scene.model, *output);
     if (!parameters->empty()) write_scene_parameters(scene.parameters, *parameters);

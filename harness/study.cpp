@@ -72,14 +72,20 @@ Study read_study(const std::filesystem::path& file, const StudyOptions& options)
   for (const Sweep& sweep : sweeps) {
     for (const SceneReference& reference : sweep.scenes) {
       const auto [known, is_new] = references.emplace(reference.name, reference);
+      const bool from_file = reference.line > 0;
+      const Place place{.file = from_file ? study.file : "",
+                        .line = from_file ? std::optional(reference.line) : std::nullopt,
+                        .field = from_file ? "scene" : "--scene"};
       if (known->second.model != reference.model || known->second.parameters != reference.parameters)
-        throw InputError({.file = study.file, .field = "scene"},
-                         fmt::format("two scenes are named '{}': {} and {}", reference.name,
-                                     known->second.model, reference.model));
-      if (is_new) {
+        throw InputError(place, fmt::format("two scenes are named '{}': {} and {}", reference.name,
+                                            known->second.model, reference.model));
+      if (!is_new) continue;
+      try {
         Scene scene = open_scene(reference.model, reference.parameters);
         study.hashes[reference.name] = scene_hash(scene);
         study.scenes.emplace(reference.name, std::move(scene));
+      } catch (const InputError& error) {
+        throw InputError(place, error.what());
       }
     }
     span_points(sweep, study.scenes, [&](const Point& point) {

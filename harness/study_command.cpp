@@ -8,6 +8,7 @@
 #include "harness/commands.h"
 #include "harness/coordinator.h"
 #include "harness/runner.h"
+#include "scene/image.h"
 
 namespace rasterbench {
 namespace {
@@ -54,6 +55,11 @@ std::map<std::string, std::string> parse_context(const std::string& text) {
     const auto equals = pair.find('=');
     if (equals == std::string::npos)
       throw InputError({.field = "--benchmark_context"}, fmt::format("'{}' is not KEY=VALUE", pair));
+    try {
+      (void)Json(pair).dump();
+    } catch (const Json::exception&) {
+      throw InputError({.field = "--benchmark_context"}, "is not UTF-8");
+    }
     custom[pair.substr(0, equals)] = pair.substr(equals + 1);
     begin = end + 1;
   }
@@ -97,6 +103,7 @@ void apply_benchmark_flags(const std::vector<std::string>& flags, StudyArguments
         study->sampling.target = 0;
       }
     } else if (name == "benchmark_out") {
+      check_output_path(value);
       coordinator.benchmark_out = value;
     } else if (name == "benchmark_out_format") {
       coordinator.benchmark_out_format = one_of({"json", "csv", "console"});
@@ -149,9 +156,13 @@ void add_study_command(CLI::App& app, Outcome& outcome, const std::vector<std::s
   const auto a = std::make_shared<StudyArguments>();
   command->add_option("FILE", a->file, "study file (TOML)")->required();
   command->add_option("--out", a->out, "folder of the results (default: results/NAME)");
-  command->add_option("--scene", a->scenes,
-                      "MODEL[@SCENE.txt] in place of the study's scenes; may be repeated");
-  command->add_option("--size", a->sizes, "WxH in place of the study's sizes; may be repeated");
+  command
+      ->add_option("--scene", a->scenes, "MODEL[@SCENE.txt] in place of the study's scenes; may be repeated")
+      ->expected(1)
+      ->allow_extra_args(false);
+  command->add_option("--size", a->sizes, "WxH in place of the study's sizes; may be repeated")
+      ->expected(1)
+      ->allow_extra_args(false);
   command->add_option("--shard", a->shard,
                       "I/N: only the I-th of N parts; points that differ in threads stay together");
   command->add_flag("--resume", a->resume, "continue an interrupted study from its journal");
@@ -186,7 +197,9 @@ void add_study_command(CLI::App& app, Outcome& outcome, const std::vector<std::s
     Study study = read_study(a->file, options);
     apply_benchmark_flags(benchmark_flags, *a, &study, coordinator);
     if (a->list || a->dry_run) return print_plan(study, a->list);
-    coordinator.out = a->out.empty() ? "results/" + study.name : a->out;
+    coordinator.out =
+        std::filesystem::path(a->out.empty() ? "results/" + study.name : a->out).lexically_normal();
+    if (!coordinator.out.has_filename()) coordinator.out = coordinator.out.parent_path();  // DIR/ means DIR
     coordinator.resume = a->resume;
     coordinator.replace = a->replace;
     outcome.exit_code = run_study(study, options, coordinator);

@@ -42,8 +42,8 @@ class TableReader {
   void number(const std::string& key, double low, double high, double& value) {
     const toml::node* node = find(key);
     if (!node) return;
-    const auto read = node->value<double>();
-    if (!node->is_number() || !(*read >= low) || !(*read <= high))
+    const auto read = node->value<double>();  // empty for an integer that no double holds
+    if (!node->is_number() || !read || !(*read >= low) || !(*read <= high))
       fail(*node, key, fmt::format("must be a number from {:g} to {:g}", low, high));
     value = *read;
   }
@@ -125,8 +125,12 @@ void read_sampling(const toml::table& table, const std::string& file, SamplingPl
   reader.number("time_limit", 0, 1e7, sampling.time_limit);
   reader.integer("launches", 1, 100, sampling.launches);
   reader.reject_unknown_keys("[sampling]");
-  if (sampling.max_samples < sampling.min_samples)
-    reader.fail(*table.get("max_samples"), "max_samples", "is below min_samples");
+  if (sampling.max_samples < sampling.min_samples) {
+    const bool given = table.contains("max_samples");
+    reader.fail(*table.get(given ? "max_samples" : "min_samples"), given ? "max_samples" : "min_samples",
+                fmt::format("max_samples ({}) is below min_samples ({})", sampling.max_samples,
+                            sampling.min_samples));
+  }
 }
 
 SceneReference relative_to(SceneReference scene, const std::filesystem::path& folder) {
@@ -204,6 +208,7 @@ Sweep read_sweep(const toml::table& table, const std::string& file, const std::f
   TableReader reader(table, file);
   reader.each("scene", [&](const toml::node& node) {
     sweep.scenes.push_back(relative_to(read_scene(reader, node, file), folder));
+    sweep.scenes.back().line = static_cast<std::int64_t>(node.source().begin.line);
   });
   reader.strings("size", sweep.sizes, [](const std::string& s) { return parse_size(s, "size"); });
   reader.each("kernel", [&](const toml::node& node) {

@@ -26,7 +26,7 @@
 #include <string_view>
 
 #include "numeric/bound.h"
-#include "pipeline/screen.h"
+#include "numeric/screen.h"
 
 namespace rasterbench {
 

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "pipeline/screen.h"
+#include "numeric/screen.h"
 #include "scene/camera.h"
 #include "scene/model.h"
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "numeric/bound.h"
-#include "pipeline/screen.h"
+#include "numeric/screen.h"
 #include "scene/camera.h"
 #include "scene/model.h"
 

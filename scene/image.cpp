@@ -173,6 +173,15 @@ void write_file(const fs::path& path, std::span<const std::string_view> pieces) 
 
 void write_file(const fs::path& path, std::string_view bytes) { write_file(path, std::span(&bytes, 1)); }
 
+void check_output_path(const fs::path& path) {
+  const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  std::error_code error;
+  if (fs::is_directory(path, error)) fail(path, EISDIR);
+  if (!fs::exists(folder, error)) fail(path, ENOENT);
+  if (!fs::is_directory(folder, error)) fail(path, ENOTDIR);
+  if (::access(folder.c_str(), W_OK) != 0) fail(path, errno);
+}
+
 void check_image_path(const fs::path& path) {
   const std::string extension = lower_case_extension(path);
   if (extension != ".ppm" && extension != ".png")

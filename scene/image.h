@@ -25,6 +25,10 @@ void write_image(const std::filesystem::path& path, std::span<const std::uint32_
 /// Throws InputError unless the extension of `path` is one that write_image knows.
 void check_image_path(const std::filesystem::path& path);
 
+/// Throws InputError if `path` can be seen not to be writable: a folder, or in none. Called before long work,
+/// so that it is not lost and earlier outputs are not replaced for nothing.
+void check_output_path(const std::filesystem::path& path);
+
 /// Writes NumPy .npy (version 1.0) arrays of shape (height, width), little-endian, C order.
 void write_npy(const std::filesystem::path& path, std::span<const std::int32_t> values, int width,
                int height);

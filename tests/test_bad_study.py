@@ -119,6 +119,11 @@ def test_the_study_is_good_before_it_is_spoilt(folder: Path) -> None:
     ("scene", 'scene = "teapot:triangle=300"', ["scene: ", "did you mean 'triangles'"]),
     ("scene", 'scene = "none.dat"', ["scene: ", "none.dat", "No such file"]),
     ("scene", 'scene = "teapot@none.txt"', ["scene: ", "none.txt", "No such file"]),
+    ("scene", 'scene = {name = "x", modl = "teapot"}', ["modl: ", "did you mean 'model'"]),
+    ("scene", 'scene = {name = "x"}', ["model: ", "missing"]),
+    ("scene", 'scene = {name = 3, model = "teapot"}', ["name: ", "string"]),
+    ("scene", 'scene = {name = "a/b", model = "teapot"}', ["name: ", "'/'"]),
+    ("scene", 'scene = [{name = "x", model = "teapot"}, {name = "x", model = "terrain"}]', ["scene: ", "two scenes", "'x'"]),
     ("name", "name =", ["bad.toml:1"]),
     ("seed", 'seed = 3 "', ["bad.toml:3"]),
     ("question", 'question = "?', ["bad.toml:2"]),
@@ -132,7 +137,7 @@ def test_bad_line(key: str, line: str, words: list[str], folder: Path) -> None:
 @pytest.mark.parametrize("value", ["[]", "3.5", "true", "{a = 1}", "2024-01-01", "[[1]]"])
 @pytest.mark.parametrize("key", ["scene", *AXES])
 def test_axis_of_a_wrong_type(key: str, value: str, folder: Path) -> None:
-    refuse_line(folder, key, f"{key} = {value}", f"{key}: ")
+    refuse_line(folder, key, f"{key} = {value}", "a scene 'a'" if (key, value[0]) == ("scene", "{") else f"{key}: ")
 
 
 @pytest.mark.parametrize("key", ["name", "question", "seed"])

@@ -1,4 +1,4 @@
-// What the geometry stage hands to a kernel: triangles on the screen.
+// What the geometry stage hands to a kernel, and a numeric mode is defined on: triangles on the screen.
 #pragma once
 
 #include <cstdint>
