@@ -4,9 +4,11 @@
 #include <sys/mman.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <sstream>
+#include <vector>
 
 #include "base/error.h"
 
@@ -15,10 +17,48 @@ namespace {
 
 constexpr double kGiB = 1024.0 * 1024.0 * 1024.0;
 
-std::size_t read_number(const char* path, std::size_t fallback) {
+std::size_t read_number(const std::string& path, std::size_t fallback) {
   std::ifstream file(path);
   std::size_t value = 0;
   return file >> value ? value : fallback;  // cgroup v2 says "max" where there is no limit
+}
+
+/// What the page cache could give back at once, by a cgroup's memory.stat.
+std::size_t reclaimable(const std::string& stat_file) {
+  std::ifstream file(stat_file);
+  std::string name;
+  std::size_t value = 0;
+  while (file >> name >> value)
+    if (name == "inactive_file" || name == "total_inactive_file") return value;
+  return 0;
+}
+
+struct CgroupMemory {
+  std::size_t limit, used;
+};
+
+/// Limit and use of every control group that this process is in, up to the root; both versions of the
+/// interface.
+std::vector<CgroupMemory> cgroup_limits() {
+  std::vector<CgroupMemory> limits;
+  std::ifstream groups("/proc/self/cgroup");
+  for (std::string line; std::getline(groups, line);) {
+    const bool version_2 = line.starts_with("0::");
+    if (!version_2 && line.find(":memory:") == std::string::npos) continue;
+    const std::string root = version_2 ? "/sys/fs/cgroup" : "/sys/fs/cgroup/memory";
+    for (std::filesystem::path group = line.substr(line.rfind(':') + 1);; group = group.parent_path()) {
+      const std::string folder = root + group.string() + "/";
+      constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
+      const std::size_t limit =
+          read_number(folder + (version_2 ? "memory.max" : "memory.limit_in_bytes"), kNone);
+      const std::size_t used =
+          read_number(folder + (version_2 ? "memory.current" : "memory.usage_in_bytes"), 0);
+      const std::size_t cache = reclaimable(folder + "memory.stat");
+      if (limit != kNone) limits.push_back({limit, used > cache ? used - cache : 0});
+      if (group == group.parent_path()) break;
+    }
+  }
+  return limits;
 }
 
 }  // namespace
@@ -33,11 +73,8 @@ std::size_t available_memory() {
     std::size_t kib = 0;
     if (fields >> name >> kib && name == "MemAvailable:") available = kib * 1024;
   }
-  const std::size_t limit = read_number("/sys/fs/cgroup/memory.max", kUnlimited);
-  if (limit != kUnlimited) {
-    const std::size_t used = read_number("/sys/fs/cgroup/memory.current", 0);
+  for (const auto& [limit, used] : cgroup_limits())
     available = std::min(available, limit > used ? limit - used : 0);
-  }
   return available;
 }
 

@@ -67,6 +67,33 @@ constinit const std::uint32_t compiled_features = 0
 #ifdef __AVX512IFMA__
                                                   | kAvx512ifma
 #endif
+#ifdef __LZCNT__
+                                                  | kLzcnt
+#endif
+#ifdef __MOVBE__
+                                                  | kMovbe
+#endif
+#ifdef __F16C__
+                                                  | kF16c
+#endif
+#ifdef __AVXVNNI__
+                                                  | kAvxvnni
+#endif
+#ifdef __XOP__
+                                                  | kXop
+#endif
+#ifdef __FMA4__
+                                                  | kFma4
+#endif
+#ifdef __SSE4A__
+                                                  | kSse4a
+#endif
+#ifdef __AVX512BF16__
+                                                  | kAvx512bf16
+#endif
+#ifdef __ADX__
+                                                  | kAdx
+#endif
 #ifdef __GFNI__
                                                   | kGfni
 #endif

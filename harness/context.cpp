@@ -137,6 +137,15 @@ Json describe_context(const Study& study, const StudyOptions& options,
                         {"point_seconds", sampling.point_seconds},
                         {"launches", sampling.launches},
                         {"time_limit_s", sampling.time_limit}}}};
+  context["overrides"] = {
+      {"scenes", options.scenes}, {"sizes", options.sizes}, {"oversubscribe", options.oversubscribe}};
+  for (const PlannedPoint& planned : study.points) {
+    const SceneReference& scene = planned.point.scene;
+    context["scenes"][scene.name] = {{"model", scene.model},
+                                     {"parameters", scene.parameters},
+                                     {"hash", study.hashes.at(scene.name)},
+                                     {"triangles", study.scenes.at(scene.name).model.triangles.size()}};
+  }
   context["region"] =
       "one frame: world triangles in memory -> RGBA8 + float32 depth in memory; stages clear, geometry, "
       "raster, resolve; "

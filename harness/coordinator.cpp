@@ -32,15 +32,6 @@ constexpr double kSampleTimeout = 600;
 constexpr double kShortFrameMs =
     0.5;  // below it, so many frames make one sample that it is not all clock and start-up
 
-/// Points that are compared with each other: everything but strategy, execution and environment is equal.
-std::string group_of(const Point& point) {
-  Point group = point;
-  group.kernel = "null";
-  group.execution = {};
-  group.environment = {};
-  return point_name(group);
-}
-
 /// Two studies writing into one folder would destroy both: the first holds a lock until it ends.
 class FolderLock {
  public:
@@ -77,6 +68,9 @@ class Coordinator {
         std::filesystem::exists(journal_path) ? read_journal(journal_path) : std::vector<Json>{};
     const bool resumed = !events.empty();
     if (resumed) replay(events, start, journal_path, states_);
+    for (const Json& event : events)
+      first_launch_ += event.at("event") == "resume" ? study_.sampling.launches : 0;
+    if (resumed) first_launch_ += study_.sampling.launches;  // its processes are new ones
     journal_ = std::make_unique<Journal>(journal_path);
     Json event = resumed ? Json{{"event", "resume"}} : start;
     event["at"] = utc_now();
@@ -99,10 +93,16 @@ class Coordinator {
       throw InputError({.file = options_.out.string(), .field = "--out"},
                        "holds a study already; add --resume to continue it or --replace to start afresh");
     if (options_.resume) return lock;
-    std::error_code error;
+    // One finished study is kept as DIR.previous; an unfinished one does not push it out.
     const std::filesystem::path previous = options_.out.string() + ".previous";
-    std::filesystem::remove_all(previous, error);
-    std::filesystem::rename(options_.out, previous, error);  // its lock goes with it
+    std::error_code error;
+    const bool finished = std::filesystem::exists(options_.out / "records.jsonl");
+    if (!finished && std::filesystem::exists(previous / "records.jsonl")) {
+      std::filesystem::remove_all(options_.out, error);
+    } else {
+      std::filesystem::remove_all(previous, error);
+      if (!error) std::filesystem::rename(options_.out, previous, error);  // its lock goes with it
+    }
     if (error) throw InputError({.file = options_.out.string(), .field = "--replace"}, error.message());
     return make_and_lock(options_.out);
   }
@@ -158,7 +158,7 @@ class Coordinator {
       if (state.open() && state.judgement.is_null()) unverified.push_back(&state);
     // Grouped by what they are compared with, so that it is drawn once.
     std::stable_sort(unverified.begin(), unverified.end(), [](const PointState* a, const PointState* b) {
-      return group_of(a->planned->point) < group_of(b->planned->point);
+      return comparison_of(a->planned->point) < comparison_of(b->planned->point);
     });
     std::size_t done = 0;
     for (PointState* state : unverified) {
@@ -168,8 +168,11 @@ class Coordinator {
           *state, {{"op", "verify"}, {"point", point_to_json(state->planned->point)}},
           [&](const Json& judgement) {
             const double frame_ms = judgement.at("frame_ms");
-            const int frames =
-                frame_ms < kShortFrameMs ? static_cast<int>(std::clamp(1.0 / frame_ms, 1.0, 1000.0)) : 1;
+            const bool warm =
+                state->planned->point.cache == "warm";  // only a sample's first frame would be cold
+            const int frames = warm && frame_ms < kShortFrameMs
+                                   ? static_cast<int>(std::clamp(1.0 / frame_ms, 1.0, 1000.0))
+                                   : 1;
             record_event({{"event", "verify"}, {"judgement", judgement}, {"frames", frames}}, *state);
           });
       if (!state->failure.empty()) progress_.note("FAILED " + state->planned->name + ": " + state->failure);
@@ -218,7 +221,7 @@ class Coordinator {
     for (const PointState& state : states_) {
       if (!state.timed() || state.samples.empty() || state.planned->point.execution.backend != "serial")
         continue;
-      const PointState*& best = fastest[group_of(state.planned->point)];
+      const PointState*& best = fastest[comparison_of(state.planned->point)];
       if (!best || median(state.times_ms()) < median(best->times_ms())) best = &state;
     }
     return fastest;
@@ -227,18 +230,20 @@ class Coordinator {
   /// Points to sample in the next block: those that have not stopped, and the bases that these are compared
   /// with.
   std::vector<PointState*> next_block() {
-    std::map<std::string, bool> open_group, open_family;
+    std::map<std::string, bool> open_comparison, open_family;
     for (const PointState& state : states_)
       if (state.open())
-        open_group[group_of(state.planned->point)] = open_family[family_of(state.planned->point)] = true;
+        open_comparison[comparison_of(state.planned->point)] = open_family[family_of(state.planned->point)] =
+            true;
     const auto fastest = fastest_serial();
     std::vector<PointState*> block;
     for (PointState& state : states_) {
       if (!state.timed()) continue;
       const Point& point = state.planned->point;
-      const auto base = fastest.find(group_of(point));
-      const bool is_base = (base != fastest.end() && base->second == &state && open_group[group_of(point)]) ||
-                           (point.execution.threads == 1 && open_family[family_of(point)]);
+      const auto base = fastest.find(comparison_of(point));
+      const bool is_base =
+          (base != fastest.end() && base->second == &state && open_comparison[comparison_of(point)]) ||
+          (point.execution.threads == 1 && open_family[family_of(point)]);
       if (state.open() || is_base) block.push_back(&state);
     }
     return block;
@@ -251,24 +256,21 @@ class Coordinator {
     double block_seconds = 0;
     for (;; ++block) {
       std::vector<PointState*> order = next_block();
-      std::erase_if(order,
-                    [&](const PointState* state) {  // taken before the interruption that --resume continues
-                      return !state->samples.empty() && state->samples.back().block == block;
-                    });
-      const bool any_open =
-          std::any_of(order.begin(), order.end(), [](const PointState* s) { return s->open(); });
-      if (!any_open) {
-        const auto waiting = [](const PointState& state) { return state.open(); };
-        if (std::none_of(states_.begin(), states_.end(), waiting)) return;
-        close_points();
-        continue;
-      }
-      if (block > 0 && out_of_time(block_seconds)) return stop_for_time();
+      const auto is_taken = [block](const PointState* state) {
+        return !state->samples.empty() && state->samples.back().block == block;
+      };
+      // A block that was interrupted is finished first, its bases too: pairs need both.
+      const bool interrupted_block = std::any_of(order.begin(), order.end(), is_taken);
+      std::erase_if(order, is_taken);
+      const auto is_open = [](const PointState* state) { return state->open(); };
+      if (!interrupted_block && std::none_of(order.begin(), order.end(), is_open)) return;
+      if (block > 0 && out_of_time(block_seconds)) return;
       Random random(study_.seed * 1000003 + static_cast<std::uint64_t>(block));
       for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random.bits() % i]);
       const auto block_begin = Clock::now();
       for (PointState* state : order) {
-        if (block > 0 && out_of_time()) return stop_for_time();  // the first block is taken whole
+        if (block > 0 && out_of_time())
+          return;  // the first block is taken whole; --resume with more time goes on
         show_sampling(block);
         take_sample(*state, block);
       }
@@ -279,7 +281,7 @@ class Coordinator {
 
   void take_sample(PointState& state, int block) {
     const Point& point = state.planned->point;
-    const int launch = block % study_.sampling.launches;
+    const int launch = first_launch_ + block % study_.sampling.launches;
     auto& processes = runners_[launch];
     try {
       Process& process = runner(processes, point.environment);
@@ -296,6 +298,9 @@ class Coordinator {
             {{"event", "fail"},
              {"reason", fmt::format("{} of {} threads ran", observed, point.execution.threads)}},
             state);
+      if (answer.at("picture") != state.judgement.at("picture"))
+        return record_event({{"event", "fail"}, {"reason", "a timed frame differs from the verified one"}},
+                            state);
       record_event({{"event", "sample"}, {"block", block}, {"launch", launch}, {"answer", answer}}, state);
     } catch (const ProcessError& error) {
       record_event({{"event", "fail"}, {"reason", error.what()}}, state);
@@ -316,16 +321,10 @@ class Coordinator {
         reason = "target";
       else if (n >= plan.max_samples)
         reason = "max_samples";
-      else if (n >= plan.min_samples && state.spent_ms >= plan.point_seconds * 1e3)
+      else if (n >= plan.min_samples && n >= plan.launches && state.spent_ms >= plan.point_seconds * 1e3)
         reason = "point_seconds";
       if (!reason.empty()) record_event({{"event", "stop"}, {"reason", reason}}, state);
     }
-  }
-
-  void stop_for_time() {
-    for (PointState& state : states_)
-      if (state.open() && !state.samples.empty())
-        record_event({{"event", "stop"}, {"reason", "time_limit"}}, state);
   }
 
   void show_sampling(int block) {
@@ -368,7 +367,8 @@ class Coordinator {
       write_file(options_.out / "context.json", dump(whole, 2) + "\n");
       write_file(options_.out / "records.jsonl", lines);
       if (!options_.benchmark_out.empty())
-        write_file(options_.benchmark_out, google_benchmark_report(records, options_.benchmark_out_format));
+        write_file(options_.benchmark_out,
+                   google_benchmark_report(records, options_.benchmark_out_format, options_.custom_context));
     } catch (const InputError& error) {  // nothing is lost: all of it is made from the journal
       throw Error(std::string(error.what()) + "; continue with --resume");
     }
@@ -376,7 +376,7 @@ class Coordinator {
     if (options_.benchmark_format.empty())
       fmt::print("{}\n", summary_table(states_));
     else
-      fmt::print("{}", google_benchmark_report(records, options_.benchmark_format));
+      fmt::print("{}", google_benchmark_report(records, options_.benchmark_format, options_.custom_context));
     fmt::print(stderr, "{} planned, {} run, {} skipped, {} failed; records in {}\n", states_.size(), run,
                skipped, failed, (options_.out / "records.jsonl").string());
     return failed == 0 ? 0 : 1;
@@ -391,6 +391,7 @@ class Coordinator {
   std::map<Environment, std::unique_ptr<Process>> verifiers_;
   std::map<int, std::map<Environment, std::unique_ptr<Process>>> runners_;  // by launch
   Process* running_ = nullptr;
+  int first_launch_ = 0;  // of this run of the study: a resumed one has launches of its own
   Progress progress_;
 };
 

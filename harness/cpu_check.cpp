@@ -36,7 +36,16 @@ constexpr NamedFeature kNames[] = {{kSse3, "sse3"},
                                    {kAvx512bitalg, "avx512bitalg"},
                                    {kAvx512vpopcntdq, "avx512vpopcntdq"},
                                    {kAvx512ifma, "avx512ifma"},
-                                   {kGfni, "gfni"}};
+                                   {kGfni, "gfni"},
+                                   {kLzcnt, "lzcnt"},
+                                   {kMovbe, "movbe"},
+                                   {kF16c, "f16c"},
+                                   {kAvxvnni, "avxvnni"},
+                                   {kXop, "xop"},
+                                   {kFma4, "fma4"},
+                                   {kSse4a, "sse4a"},
+                                   {kAvx512bf16, "avx512bf16"},
+                                   {kAdx, "adx"}};
 
 void print(const char* text) {
   // Streams are not initialised yet. A message that cannot be written has no one to tell.
@@ -88,6 +97,20 @@ std::uint32_t present_features() {
   RASTERBENCH_ASK(kAvx512vpopcntdq, "avx512vpopcntdq");
   RASTERBENCH_ASK(kAvx512ifma, "avx512ifma");
   RASTERBENCH_ASK(kGfni, "gfni");
+#ifdef __clang__
+  // clang does not know these names; the native preset is built with gcc.
+  present |= kLzcnt | kMovbe | kF16c | kAvxvnni | kXop | kFma4 | kSse4a | kAvx512bf16 | kAdx;
+#else
+  RASTERBENCH_ASK(kLzcnt, "lzcnt");
+  RASTERBENCH_ASK(kMovbe, "movbe");
+  RASTERBENCH_ASK(kF16c, "f16c");
+  RASTERBENCH_ASK(kAvxvnni, "avxvnni");
+  RASTERBENCH_ASK(kXop, "xop");
+  RASTERBENCH_ASK(kFma4, "fma4");
+  RASTERBENCH_ASK(kSse4a, "sse4a");
+  RASTERBENCH_ASK(kAvx512bf16, "avx512bf16");
+  RASTERBENCH_ASK(kAdx, "adx");
+#endif
 #undef RASTERBENCH_ASK
 #endif
   return present;

@@ -29,6 +29,15 @@ enum CpuFeature : std::uint32_t {
   kAvx512vpopcntdq = 1u << 19,
   kAvx512ifma = 1u << 20,
   kGfni = 1u << 21,
+  kLzcnt = 1u << 22,
+  kMovbe = 1u << 23,
+  kF16c = 1u << 24,
+  kAvxvnni = 1u << 25,
+  kXop = 1u << 26,
+  kFma4 = 1u << 27,
+  kSse4a = 1u << 28,
+  kAvx512bf16 = 1u << 29,
+  kAdx = 1u << 30,
 };
 
 /// What the kernels' files were compiled to need. Constant data of a file that is compiled like them.

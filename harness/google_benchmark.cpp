@@ -5,6 +5,7 @@
 #include <cmath>
 #include <memory>
 #include <numeric>
+#include <set>
 #include <sstream>
 #include <vector>
 
@@ -32,6 +33,8 @@ Reporter::Run named_run(const Json& record) {
   Reporter::Run run;
   run.run_name.function_name = record.at("name");
   run.time_unit = benchmark::kMillisecond;
+  run.family_index = 0;  // the library leaves these to chance
+  run.per_family_instance_index = 0;
   run.iterations = 1;
   run.threads = record.at("config").at("threads");
   return run;
@@ -74,7 +77,11 @@ std::vector<Reporter::Run> runs_of(const Json& record) {
 
 }  // namespace
 
-std::string google_benchmark_report(std::span<const Json> records, const std::string& format) {
+std::string google_benchmark_report(std::span<const Json> records, const std::string& format,
+                                    const std::map<std::string, std::string>& custom_context) {
+  static std::set<std::string> added;  // the library's own list is global and refuses a key twice
+  for (const auto& [key, value] : custom_context)
+    if (added.insert(key).second) benchmark::AddCustomContext(key, value);
   const auto reporter = make_reporter(format);
   std::ostringstream text;
   reporter->SetOutputStream(&text);

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
 #include <vector>
 
 #include "harness/point.h"
@@ -17,7 +16,7 @@ class Journal {
   Journal(const Journal&) = delete;
   Journal& operator=(const Journal&) = delete;
 
-  /// Writes one line with one system call. Throws Error when the disk is full: the study stops and can be
+  /// Writes one line at once. Throws Error when the disk is full: the study stops and can be
   /// resumed.
   void append(const Json& event);
 

@@ -15,8 +15,8 @@ int run(int argc, char** argv) {
   using namespace rasterbench;
   CLI::App app("rasterbench: parallel strategies for triangle rasterization on CPUs, compared",
                "rasterbench");
-  app.set_version_flag("--version",
-                       fmt::format("rasterbench {} ({})", build_info::kVersion, build_info::kCommit));
+  const std::string version = fmt::format("rasterbench {} ({})", build_info::kVersion, build_info::kCommit);
+  app.set_version_flag("--version", version);
   app.require_subcommand(1);
   app.set_help_all_flag("--help-all", "the options of all subcommands");
 
@@ -37,6 +37,9 @@ int run(int argc, char** argv) {
   add_scene_command(app);
   add_runner_command(app, outcome, benchmark_flags);
   for (CLI::App* command : app.get_subcommands({})) command->set_version_flag("--version", version);
+  if (!benchmark_flags.empty() && argc > 1 && argv[1] != std::string_view("study") &&
+      argv[1] != std::string_view("runner"))
+    throw InputError({.field = benchmark_flags.front()}, "goes with the command study");
   try {
     app.parse(arguments);
   } catch (const CLI::ParseError& error) {

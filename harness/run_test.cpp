@@ -112,7 +112,7 @@ TEST_F(RunTest, GoogleBenchmarkReportHasEverySample) {
   apply_event(verify(), states_[0]);
   for (int i = 0; i < 3; ++i) apply_event(sample(i, i + 1), states_[0]);
   const std::vector<Json> records{make_record(states_[0], study_, "c"), make_record(states_[1], study_, "c")};
-  const Json report = Json::parse(google_benchmark_report(records, "json"));
+  const Json report = Json::parse(google_benchmark_report(records, "json", {}));
   const Json& runs = report.at("benchmarks");
   ASSERT_EQ(runs.size(), 7u);  // three samples, mean, median, stddev, one error
   EXPECT_NEAR(runs[2].at("real_time").get<double>(), 3.0, 1e-9);

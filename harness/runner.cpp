@@ -2,6 +2,7 @@
 
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -27,9 +28,13 @@ class CollectingReporter final : public benchmark::BenchmarkReporter {
   Run last;
 };
 
-/// Reads and writes more than any last-level cache holds, so that nothing of the point is left in it.
+/// Reads and writes four times what the last-level cache holds, so that nothing of the point is left in it.
 void sweep_caches() {
-  static std::vector<std::uint64_t> sink(std::size_t{256} << 17, 1);  // 256 MiB
+  static std::vector<std::uint64_t> sink(
+      std::max(std::size_t{64} << 20,
+               4 * static_cast<std::size_t>(std::max(0L, sysconf(_SC_LEVEL3_CACHE_SIZE)))) /
+          8,
+      1);
   for (std::size_t i = 0; i < sink.size(); i += 8) sink[i] += 1;
   benchmark::DoNotOptimize(sink.data());
 }
@@ -73,6 +78,7 @@ class Runner {
     benchmark::RegisterBenchmark(
         name.c_str(),
         [&](benchmark::State& state) {
+          stages = {};  // Google Benchmark may be told to call this more than once: the last call counts
           for ([[maybe_unused]] const auto iteration : state) {
             const auto begin = std::chrono::steady_clock::now();
             for (int frame = 0; frame < frames; ++frame) {
@@ -104,6 +110,7 @@ class Runner {
     for (const WorkerTally& worker : tally)
       threads.push_back(
           {{"busy_ms", worker.busy_seconds * 1e3}, {"iterations", worker.iterations}, {"cpu", worker.cpu}});
+    answer["picture"] = picture_hash(*renderer);
     for (const auto& [counter, value] : reporter.last.counters) answer["counters"][counter] = value.value;
     return answer;
   }
@@ -137,7 +144,8 @@ std::map<std::string, std::string> environment_variables(const Environment& envi
   variables["OMP_WAIT_POLICY"] = environment.wait_policy == "default" ? "" : environment.wait_policy;
   variables["OMP_DYNAMIC"] = "false";
   // What would change a schedule or a thread count behind the study's back.
-  for (const char* name : {"OMP_SCHEDULE", "OMP_NUM_THREADS", "GOMP_CPU_AFFINITY", "KMP_AFFINITY"})
+  for (const char* name : {"OMP_SCHEDULE", "OMP_NUM_THREADS", "GOMP_CPU_AFFINITY", "KMP_AFFINITY",
+                           "BENCHMARK_REPETITIONS", "BENCHMARK_MIN_TIME", "BENCHMARK_FILTER"})
     variables[name] = "";
   if (environment.runtime == "libomp") {
     const std::string path = find_libomp();

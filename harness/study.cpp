@@ -1,11 +1,8 @@
 #include "harness/study.h"
 
 #include <fmt/format.h>
-#include <toml++/toml.h>
 
 #include <algorithm>
-#include <fstream>
-#include <iterator>
 #include <set>
 
 #include "base/error.h"
@@ -46,14 +43,24 @@ std::string reason_to_skip(const Point& point, const Scene& scene, const Samplin
   return {};
 }
 
-std::uint64_t stable_index(const std::string& family, std::vector<std::string>& seen) {
-  const auto found = std::find(seen.begin(), seen.end(), family);
-  if (found != seen.end()) return static_cast<std::uint64_t>(found - seen.begin());
-  seen.push_back(family);
-  return seen.size() - 1;
+/// The place of `name` in `seen`, where it is put if it is new.
+std::size_t index_of(const std::string& name, std::vector<std::string>& seen) {
+  const auto found = std::find(seen.begin(), seen.end(), name);
+  const auto index = static_cast<std::size_t>(found - seen.begin());
+  if (found == seen.end()) seen.push_back(name);
+  return index;
 }
 
 }  // namespace
+
+std::string comparison_of(const Point& point) {
+  Point common = point;
+  common.kernel = "null";
+  common.execution = {};
+  common.environment = {};
+  common.tile = Point().tile;
+  return point_name(common);
+}
 
 std::string family_of(const Point& point) {
   Point family = point;
@@ -67,7 +74,7 @@ Study read_study(const std::filesystem::path& file, const StudyOptions& options)
   const std::vector<Sweep> sweeps = read_sweeps(file, study.text, options.scenes, options.sizes);
 
   std::set<std::string> names;
-  std::vector<std::string> families;
+  std::vector<std::string> comparisons;
   std::map<std::string, SceneReference> references;
   for (const Sweep& sweep : sweeps) {
     for (const SceneReference& reference : sweep.scenes) {
@@ -93,15 +100,20 @@ Study read_study(const std::filesystem::path& file, const StudyOptions& options)
       if (!names.insert(planned.name).second) return;
       if (options.filter && std::regex_search(planned.name, *options.filter) == options.filter_excludes)
         return;
-      const std::uint64_t family = stable_index(family_of(point), families);
-      if (family % static_cast<std::uint64_t>(options.shards) !=
-          static_cast<std::uint64_t>(options.shard - 1))
+      const std::size_t comparison = index_of(comparison_of(point), comparisons);
+      if (comparison % static_cast<std::size_t>(options.shards) !=
+          static_cast<std::size_t>(options.shard - 1))
         return;
       planned.skip =
           reason_to_skip(point, study.scenes.at(point.scene.name), study.sampling, options.oversubscribe);
       study.points.push_back(std::move(planned));
     });
   }
+  if (static_cast<std::size_t>(options.shards) > comparisons.size() && !comparisons.empty())
+    throw InputError(
+        {.field = "--shard"},
+        fmt::format("this study has {} comparison{} that must stay whole: use at most as many shards",
+                    comparisons.size(), comparisons.size() == 1 ? "" : "s"));
   return study;
 }
 

@@ -57,8 +57,11 @@ struct StudyOptions {
 /// did-you-mean. Paths of models in the file are relative to it.
 Study read_study(const std::filesystem::path& file, const StudyOptions& options);
 
-/// Points are dealt to shards by family: those that differ only in threads stay together, so that a speedup
-/// never compares two machines.
+/// What `point` is compared with: equal for points that differ only in strategy, execution and environment.
+/// Shards hold whole comparisons, bases included, so that a speedup never compares two machines.
+std::string comparison_of(const Point& point);
+
+/// Equal for points that differ only in threads: the others are one curve over them.
 std::string family_of(const Point& point);
 
 /// The study files that come with the program: those in `studies/` of the source tree it was built from, if

@@ -125,6 +125,10 @@ void read_sampling(const toml::table& table, const std::string& file, SamplingPl
   reader.number("time_limit", 0, 1e7, sampling.time_limit);
   reader.integer("launches", 1, 100, sampling.launches);
   reader.reject_unknown_keys("[sampling]");
+  if (sampling.max_samples < sampling.launches)
+    reader.fail(*table.get("launches"), "launches",
+                fmt::format("{} launches need at least as many samples: max_samples is {}", sampling.launches,
+                            sampling.max_samples));
   if (sampling.max_samples < sampling.min_samples) {
     const bool given = table.contains("max_samples");
     reader.fail(*table.get(given ? "max_samples" : "min_samples"), given ? "max_samples" : "min_samples",
@@ -302,6 +306,10 @@ std::vector<Sweep> read_sweeps(const std::filesystem::path& path, const std::str
   const std::string file = path.string();
   const toml::table table = parse_toml(text, file);
   const toml::array* sweeps = table.get_as<toml::array>("sweep");
+  if (const toml::node* other = table.get("sweep"); other && !sweeps)
+    throw InputError(
+        {.file = file, .line = static_cast<std::int64_t>(other->source().begin.line), .field = "sweep"},
+        "must be [[sweep]] tables, with two brackets");
   if (!sweeps || sweeps->empty())
     throw InputError({.file = file, .field = "sweep"}, "a study needs at least one [[sweep]]");
   std::vector<Sweep> all;

@@ -113,25 +113,29 @@ threads = [1, 2]
   options.filter_excludes = true;
   EXPECT_EQ(read(text, options).points.size(), 16u);
 
-  std::vector<std::string> all, families;
-  for (int shard = 1; shard <= 3; ++shard) {
+  const std::string two = text + "numeric = [\"f32\", \"fixed_8\"]\n";
+  std::vector<std::string> all, comparisons;
+  for (int shard = 1; shard <= 2; ++shard) {
     StudyOptions part;
     part.shard = shard;
-    part.shards = 3;
+    part.shards = 2;
     std::vector<std::string> own;
-    for (const PlannedPoint& planned : read(text, part).points) {
+    for (const PlannedPoint& planned : read(two, part).points) {
       all.push_back(planned.name);
-      own.push_back(family_of(planned.point));
+      own.push_back(comparison_of(planned.point));
     }
     std::sort(own.begin(), own.end());
     own.erase(std::unique(own.begin(), own.end()), own.end());
-    families.insert(families.end(), own.begin(), own.end());
+    comparisons.insert(comparisons.end(), own.begin(), own.end());
   }
   std::sort(all.begin(), all.end());
-  EXPECT_EQ(all.size(), 24u);
+  EXPECT_EQ(all.size(), 48u);
   EXPECT_EQ(std::unique(all.begin(), all.end()), all.end());
-  std::sort(families.begin(), families.end());
-  EXPECT_EQ(std::unique(families.begin(), families.end()), families.end()) << "a family is in two shards";
+  EXPECT_EQ(comparisons.size(), 2u);
+  EXPECT_NE(comparisons.at(0), comparisons.at(1)) << "a comparison is in two shards";
+  StudyOptions too_many;
+  too_many.shards = 3;
+  EXPECT_THROW(read(two, too_many), InputError);
 }
 
 }  // namespace

@@ -10,6 +10,9 @@
 
 namespace rasterbench {
 
+/// The hash of what `renderer` drew last, colours and depths: ties a timed frame to the verified one.
+std::string picture_hash(const Renderer& renderer);
+
 /// Judges points. Keeps the expected pictures of the last (scene, size, mode, fill, near), which points are
 /// sorted by.
 class Verifier {

@@ -37,6 +37,8 @@ struct AllPixels {
       });
     }
 
+    std::size_t bytes() const { return prepared_.bytes(); }
+
    private:
     Buffer<typename Mode::Prepared> prepared_;
   };

@@ -68,6 +68,10 @@ class Bins {
     });
   }
 
+  std::size_t bytes() const {
+    return prepared_.bytes() + cursors_.bytes() + begin_.size() * sizeof(begin_[0]) + entries_.bytes();
+  }
+
   std::int64_t cells() const { return std::int64_t{columns_} * rows_; }
 
   /// Pixels of a cell, cut to the image.

@@ -171,6 +171,17 @@ TEST(Kernels, CanaryDrawsNothingAndDiffers) {
             100);
 }
 
+TEST(Kernels, StaleCanaryDrawsOnceOnly) {
+  const Scene scene = generate("teapot:triangles=2000");
+  const FrameSettings settings{.width = 64, .height = 36};
+  const auto renderer = make_renderer("stale", "f32", {&scene, settings, {}});
+  const Picture expected = render_specification(scene, "f32", settings);
+  renderer->draw();
+  EXPECT_EQ(differing_pixels(picture_of(*renderer, settings), expected), 0);
+  renderer->draw();
+  EXPECT_GT(differing_pixels(picture_of(*renderer, settings), expected), 100);
+}
+
 TEST(Kernels, UnknownNamesSuggest) {
   EXPECT_THROW(
       {

@@ -30,6 +30,8 @@ struct RowParallel {
       });
     }
 
+    std::size_t bytes() const { return bins_.bytes(); }
+
    private:
     Bins<Mode> bins_;
   };

@@ -54,7 +54,8 @@ class EdgeWalk {
   std::int32_t fix(std::int32_t probe, std::int32_t y, std::int32_t x0, std::int32_t x1) const {
     std::int32_t low = x0, high = x1;  // before low nothing is beyond, from high on everything is
     bool below_known = false, above_known = false;
-    for (std::int32_t step = 1; low < high; step *= 2) {
+    std::int32_t step = 1;  // at most twice the image's width
+    while (low < high) {
       if (beyond(probe, y)) {
         high = probe;
         above_known = true;
@@ -62,10 +63,12 @@ class EdgeWalk {
         low = probe + 1;
         below_known = true;
       }
-      if (below_known && above_known)
+      if (below_known && above_known) {
         probe = low + (high - low) / 2;
-      else
-        probe = above_known ? std::max(low, high - step) : std::min(high - 1, low + step - 1);
+        continue;
+      }
+      probe = above_known ? std::max(low, high - step) : std::min(high - 1, low + step - 1);
+      step *= 2;
     }
     return low;
   }
@@ -94,6 +97,8 @@ struct Scanline {
             band, [&](const auto& triangle) { walk(triangle, intersect(triangle.box, bounds), out); });
       });
     }
+
+    std::size_t bytes() const { return bins_.bytes(); }
 
    private:
     static constexpr int kBandRows = 16;

@@ -31,6 +31,8 @@ struct TileParallel {
       });
     }
 
+    std::size_t bytes() const { return bins_.bytes(); }
+
    private:
     Bins<Mode> bins_;
   };

@@ -33,6 +33,8 @@ struct TriangleLocks {
       });
     }
 
+    std::size_t bytes() const { return sizeof(locks_); }
+
    private:
     using Key = typename Mode::Key;
     static constexpr std::int32_t kSegment = 64;  // pixels: one cache line of merging per eight of them

@@ -51,6 +51,12 @@ struct TrianglePrivate {
       });
     }
 
+    std::size_t bytes() const {
+      std::size_t sum = 0;
+      for (const Layer& layer : layers_) sum += layer.bytes();
+      return sum;
+    }
+
    private:
     using Key = typename Mode::Key;
 
@@ -60,6 +66,7 @@ struct TrianglePrivate {
       Layer(std::size_t pixels, std::size_t rows)
           : keys_(pixels, "a thread's visibility buffer"), frame_of_(rows, 0) {}
 
+      std::size_t bytes() const { return keys_.bytes() + frame_of_.size() * sizeof(frame_of_[0]); }
       void next_frame() { ++frame_; }
       bool touched(std::size_t y) const { return frame_of_[y] == frame_; }
       Key* row(std::size_t y, std::size_t width) {

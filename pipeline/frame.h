@@ -70,7 +70,7 @@ struct Visibility {
   typename Mode::Key& at(std::int64_t x, std::int64_t y) { return row(y)[x]; }
 };
 
-/// Seconds per stage; a stage that a kernel does not have would be negative.
+/// Seconds per stage.
 struct StageSeconds {
   double clear = 0, geometry = 0, raster = 0, resolve = 0;
   double total() const { return clear + geometry + raster + resolve; }

@@ -35,7 +35,7 @@ class ScreenTriangles {
                                 static_cast<std::int32_t>(first), transform, options, slots_.data() + first,
                                 extra_[b], counts_[b]);
     });
-    append_extra();
+    append_extra(execution);
   }
 
   /// Puts the triangles into a random order (Fisher & Yates); each keeps its id.
@@ -56,13 +56,16 @@ class ScreenTriangles {
  private:
   static constexpr std::size_t kBatch = 256;  // triangles; 9 KiB in, 10 KiB out: stays in L1
 
-  void append_extra() {
+  void append_extra(Execution& execution) {
     size_ = triangle_count_;
     for (const auto& pieces : extra_) size_ += pieces.size();
     if (size_ >
         slots_.size()) {  // happens in a point's first frame only: clipping does not change between frames
       Buffer<ScreenTriangle<Real>> larger(size_, "the array of screen triangles");
-      std::copy_n(slots_.data(), triangle_count_, larger.data());
+      execution.uniform_loop(static_cast<std::int64_t>(batches_), [&](std::int64_t batch, int) {
+        const std::size_t first = static_cast<std::size_t>(batch) * kBatch;
+        std::copy_n(slots_.data() + first, std::min(kBatch, triangle_count_ - first), larger.data() + first);
+      });
       slots_ = std::move(larger);
     }
     ScreenTriangle<Real>* end = slots_.data() + triangle_count_;
@@ -79,6 +82,7 @@ class ScreenTriangles {
 
 /// Renderer for a staged strategy: `Strategy` has
 ///   void draw(const StagedTriangles<Mode>&, Visibility<Mode>, Execution&)
+///   std::size_t bytes() const    memory of its own, if it has any
 /// and may keep memory between frames; it is made afresh for every point.
 template <NumericMode Mode, class Strategy>
 class FrameRenderer final : public Renderer {
@@ -137,7 +141,9 @@ class FrameRenderer final : public Renderer {
   }
 
   std::size_t bytes() const override {
-    return screen_.bytes() +
+    std::size_t of_strategy = 0;
+    if constexpr (requires { strategy_.bytes(); }) of_strategy = strategy_.bytes();
+    return of_strategy + screen_.bytes() +
            settings_.pixels() * (sizeof(typename Mode::Key) + sizeof(std::uint32_t) + sizeof(float));
   }
 

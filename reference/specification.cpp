@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 
+#include "base/buffer.h"
 #include "base/error.h"
 #include "base/suggest.h"
 #include "numeric/modes.h"
@@ -27,7 +28,8 @@ template <NumericMode Mode>
 Picture render_mode(const Scene& scene, const FrameSettings& settings) {
   using Real = typename Mode::Real;
   const auto& triangles = scene.model.triangles;
-  Picture picture{settings.width, settings.height, {}, {}, {}, {}};
+  Picture picture{.width = settings.width, .height = settings.height};
+  checked_bytes(settings.pixels(), sizeof(typename Mode::Key) + 12, "the specification's picture");
   std::vector<ScreenTriangle<Real>> screen(triangles.size()), extra;
   transform_triangles<Real>(triangles, 0, make_screen_transform(sized_camera(scene, settings)),
                             settings.geometry, screen.data(), extra, picture.counts);
@@ -40,16 +42,23 @@ Picture render_mode(const Scene& scene, const FrameSettings& settings) {
     if (triangle.id < 0) continue;
     const auto prepared = Mode::prepare(
         triangle, settings.fill, swap_rank(settings.tie, count, static_cast<std::uint32_t>(triangle.id)));
+    const PixelBox tested = intersect(prepared.box, settings.bounds());
+    if (!tested.empty())
+      picture.samples_tested += std::int64_t{tested.x1 - tested.x0} * (tested.y1 - tested.y0);
     const PixelBox box = generous_box(triangle, settings.bounds());
     for (std::int32_t y = box.y0; y < box.y1; ++y)
       for (std::int32_t x = box.x0; x < box.x1; ++x) {
         if (!covers<Mode>(prepared, x, y)) continue;
+        ++picture.samples_covered;
         const auto key = Mode::key(Mode::depth(prepared, x, y), prepared.rank);
         auto& pixel = keys[static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x)];
         if (key < pixel) pixel = key;
       }
   }
 
+  picture.ids.reserve(keys.size());
+  picture.depths.reserve(keys.size());
+  picture.colours.reserve(keys.size());
   const std::uint32_t background = pack_rgba(scene.parameters.background);
   for (const auto& key : keys) {
     const bool drawn = key < Mode::kClear;
@@ -91,12 +100,11 @@ std::int64_t differing_pixels(const Picture& a, const Picture& b) {
 Picture picture_of(const Renderer& renderer, const FrameSettings& settings) {
   const auto depths = renderer.depths();
   const auto colours = renderer.colours();
-  return {settings.width,
-          settings.height,
-          renderer.ids(),
-          {depths.begin(), depths.end()},
-          {colours.begin(), colours.end()},
-          {}};
+  return {.width = settings.width,
+          .height = settings.height,
+          .ids = renderer.ids(),
+          .depths = {depths.begin(), depths.end()},
+          .colours = {colours.begin(), colours.end()}};
 }
 
 }  // namespace rasterbench

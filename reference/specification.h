@@ -14,10 +14,12 @@ namespace rasterbench {
 struct Picture {
   int width = 0;
   int height = 0;
-  std::vector<std::int32_t> ids;       ///< -1 = background
-  std::vector<float> depths;           ///< 1 = background
-  std::vector<std::uint32_t> colours;  ///< RGBA8
-  GeometryCounts counts;
+  std::vector<std::int32_t> ids = {};       ///< -1 = background
+  std::vector<float> depths = {};           ///< 1 = background
+  std::vector<std::uint32_t> colours = {};  ///< RGBA8
+  GeometryCounts counts = {};
+  std::int64_t samples_tested = 0;   ///< in the boxes of all screen triangles, cut to the image
+  std::int64_t samples_covered = 0;  ///< of those, inside: pixels times depth complexity
 };
 
 /// Draws `scene` by the specification of `mode`. Throws InputError for a mode that does not exist.
