@@ -183,10 +183,10 @@ class Coordinator {
   /// wrong is said and costs the picture, not the point.
   void draw_images(Json& context) {
     Json& images = context["images"] = Json::object();
-    std::set<std::string> files;
+    std::set<std::string> files, tried;
     for (PointState& state : states_) {
       const std::string& scene = state.planned->point.scene.name;
-      if (!state.timed() || state.judgement.is_null() || images.contains(scene)) continue;
+      if (!state.timed() || state.judgement.is_null() || !tried.insert(scene).second) continue;
       std::string stem = scene;
       for (char& c : stem)
         if (!std::isalnum(static_cast<unsigned char>(c)) && c != '-' && c != '_' && c != '.') c = '_';
@@ -202,15 +202,11 @@ class Coordinator {
                  kSampleTimeout);
         images[scene] = file;
       } catch (const ProcessError& error) {
-        images[scene] = nullptr;
         progress_.note(fmt::format("no picture of {}: {}", scene, error.what()));
       } catch (const std::filesystem::filesystem_error& error) {
-        images[scene] = nullptr;
         progress_.note(fmt::format("no picture of {}: {}", scene, error.what()));
       }
     }
-    for (auto image = images.begin(); image != images.end();)
-      image = image->is_null() ? images.erase(image) : image + 1;
     verifiers_.clear();
   }
 

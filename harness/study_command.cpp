@@ -158,10 +158,10 @@ void add_study_command(CLI::App& app, Outcome& outcome, const std::vector<std::s
   command->add_option("--out", a->out, "folder of the results (default: results/NAME)");
   command
       ->add_option("--scene", a->scenes, "MODEL[@SCENE.txt] in place of the study's scenes; may be repeated")
-      ->expected(1)
+
       ->allow_extra_args(false);
   command->add_option("--size", a->sizes, "WxH in place of the study's sizes; may be repeated")
-      ->expected(1)
+
       ->allow_extra_args(false);
   command->add_option("--shard", a->shard,
                       "I/N: only the I-th of N parts; points that differ in threads stay together");
@@ -198,7 +198,7 @@ void add_study_command(CLI::App& app, Outcome& outcome, const std::vector<std::s
     apply_benchmark_flags(benchmark_flags, *a, &study, coordinator);
     if (a->list || a->dry_run) return print_plan(study, a->list);
     coordinator.out =
-        std::filesystem::path(a->out.empty() ? "results/" + study.name : a->out).lexically_normal();
+        a->out.empty() ? "results/" + study.name : a->out;
     if (!coordinator.out.has_filename()) coordinator.out = coordinator.out.parent_path();  // DIR/ means DIR
     coordinator.resume = a->resume;
     coordinator.replace = a->replace;

@@ -85,10 +85,10 @@ VERIFY = {"conforms": bool, "checked_against": TEXT, "differing_pixels": WHOLE, 
 ORACLE = {"renderer": TEXT, "identical": WHOLE, "edge_ties": WHOLE, "depth_ties": WHOLE, "errors": WHOLE, "max_depth_error_steps": NUMBER,
           "within_bound": bool}
 WORK = {"triangles": WHOLE, "drawn": WHOLE, "pieces": WHOLE, "rejected": dict, "near_clipped": WHOLE, "guard_clipped": WHOLE,
-        "covered_pixels": WHOLE, "bytes": WHOLE}
+        "fragments_tested": WHOLE, "fragments_covered": WHOLE, "covered_pixels": WHOLE, "bytes": WHOLE}
 REJECTED = dict.fromkeys(["non_finite", "zero_area", "behind_near", "beyond_far", "off_screen", "back_facing"], WHOLE)
 CONTEXT = {"schema": WHOLE, "id": TEXT, "started": TEXT, "finished": TEXT, "program": dict, "libraries": dict, "machine": dict,
-           "environment": dict, "study": dict, "region": TEXT, "custom": dict, "points": dict, "images": dict}
+           "environment": dict, "study": dict, "region": TEXT, "scenes": dict, "overrides": dict, "custom": dict, "points": dict, "images": dict}
 MACHINE = {"hostname": TEXT, "cpu": TEXT, "cpus_online": WHOLE, "cpus_allowed": LIST, "cores": WHOLE, "packages": WHOLE, "numa_nodes": WHOLE,
            "smt": bool, "caches": LIST, "memory_bytes": WHOLE, "governor": TEXT, "load_average": TEXT, "kernel": TEXT, "virtualisation": TEXT}
 
@@ -168,7 +168,7 @@ def test_good_points_are_verified(study: Study) -> None:
         v, o, w = r["verify"], r["verify"]["oracle"], r["work"]
         assert v["conforms"] and v["differing_pixels"] == 0 and o["within_bound"] and o["errors"] == 0
         assert o["identical"] + o["edge_ties"] + o["depth_ties"] == r["config"]["size"][0] * r["config"]["size"][1]
-        assert 0 < w["drawn"] <= w["triangles"] and w["covered_pixels"] > 100 and w["bytes"] > 0
+        assert 0 < w["drawn"] <= w["triangles"] and w["fragments_tested"] >= w["fragments_covered"] >= w["covered_pixels"] > 100 and w["bytes"] > 0
         assert w["drawn"] + sum(w["rejected"].values()) == w["triangles"]
         assert r["threads_observed"] == r["config"]["threads"] == len(r["per_thread"])
         for worker in r["per_thread"]:

@@ -191,7 +191,7 @@ def test_killed_runners_of_several_environments(tmp_path: Path) -> None:
     assert status == {("none", "ok"): 2, ("none", "failed"): 1, ("close", "ok"): 2, ("close", "failed"): 1}
 
 
-@pytest.mark.parametrize("options, words", [([], ["holds a study"]), (["--resume"], ["another study"]), (["--replace"], ["another study"])],
+@pytest.mark.parametrize("options, words", [([], ["another study"]), (["--resume"], ["another study"]), (["--replace"], ["another study"])],
                          ids=["plain", "resume", "replace"])
 def test_second_study_in_the_same_folder_is_refused(options: list[str], words: list[str], folder: Path) -> None:
     with started(folder) as process:

@@ -82,19 +82,26 @@ def test_filter_and_its_negation_part_the_points(folder: Path) -> None:
     assert listed(folder, "--benchmark_filter=-atomics.*openmp") == dropped
 
 
-@pytest.mark.parametrize("shards", [2, 3, 5])
-def test_shards_part_the_points_and_keep_families_together(shards: int, folder: Path) -> None:
-    parts = [listed(folder, "--shard", f"{i}/{shards}") for i in range(1, shards + 1)]
+FOUR = ("--size", "64x48", "--size", "48x64", "--size", "32x32", "--size", "9x7")  # comparisons
+
+
+@pytest.mark.parametrize("shards", [2, 3, 4])
+def test_shards_part_the_points_and_keep_comparisons_whole(shards: int, folder: Path) -> None:
+    parts = [listed(folder, *FOUR, "--shard", f"{i}/{shards}") for i in range(1, shards + 1)]
     assert all(parts)
-    assert sorted(name for part in parts for name in part) == sorted(listed(folder))
-    families = [{tuple(name.split("/")[:7] + name.split("/")[8:]) for name in part} for part in parts]
-    assert sum(map(len, families)) == len(set().union(*families))
+    assert sorted(name for part in parts for name in part) == sorted(listed(folder, *FOUR))
+    sizes = [{name.split("/")[1] for name in part} for part in parts]
+    assert sum(map(len, sizes)) == len(set().union(*sizes)) == 4
+
+
+def test_more_shards_than_comparisons_are_refused(folder: Path) -> None:
+    refused(study(folder, *FOUR, "--shard", "5/5"), "--shard", "4 comparisons")
 
 
 def test_a_shard_is_recorded(folder: Path) -> None:
-    study(folder, "--out", "out", "--shard", "2/3").ok()
+    study(folder, *FOUR, "--out", "out", "--shard", "2/3").ok()
     assert json.loads((folder / "out/context.json").read_text())["study"]["shard"] == "2/3"
-    assert [r["name"] for r in records(folder / "out")] == listed(folder, "--shard", "2/3")
+    assert [r["name"] for r in records(folder / "out")] == listed(folder, *FOUR, "--shard", "2/3")
 
 
 # The folder.
