@@ -1,9 +1,6 @@
 #include "harness/coordinator.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -13,6 +10,7 @@
 #include "base/error.h"
 #include "base/hash.h"
 #include "harness/context.h"
+#include "harness/folder_lock.h"
 #include "harness/google_benchmark.h"
 #include "harness/process.h"
 #include "harness/progress.h"
@@ -31,26 +29,6 @@ constexpr double kVerifyTimeout = 3600;  // seconds: a specification of a huge p
 constexpr double kSampleTimeout = 600;
 constexpr double kShortFrameMs =
     0.5;  // below it, so many frames make one sample that it is not all clock and start-up
-
-/// Two studies writing into one folder would destroy both: the first holds a lock until it ends.
-class FolderLock {
- public:
-  explicit FolderLock(const std::filesystem::path& folder) {
-    file_ = open((folder / ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-    if (file_ < 0) throw InputError({.file = folder.string(), .field = "--out"}, "cannot be written");
-    if (flock(file_, LOCK_EX | LOCK_NB) != 0) {
-      close(file_);
-      throw InputError({.file = folder.string(), .field = "--out"},
-                       "another study is writing into this folder");
-    }
-  }
-  ~FolderLock() { close(file_); }
-  FolderLock(const FolderLock&) = delete;
-  FolderLock& operator=(const FolderLock&) = delete;
-
- private:
-  int file_;
-};
 
 class Coordinator {
  public:

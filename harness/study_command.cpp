@@ -160,7 +160,8 @@ void add_study_command(CLI::App& app, Outcome& outcome, const std::vector<std::s
       ->add_option("--scene", a->scenes, "MODEL[@SCENE.txt] in place of the study's scenes; may be repeated")
 
       ->allow_extra_args(false);
-  command->add_option("--size", a->sizes, "WxH in place of the study's sizes; may be repeated")
+  command
+      ->add_option("--size", a->sizes, "WxH in place of the study's sizes; may be repeated")
 
       ->allow_extra_args(false);
   command->add_option("--shard", a->shard,
@@ -197,8 +198,7 @@ void add_study_command(CLI::App& app, Outcome& outcome, const std::vector<std::s
     Study study = read_study(a->file, options);
     apply_benchmark_flags(benchmark_flags, *a, &study, coordinator);
     if (a->list || a->dry_run) return print_plan(study, a->list);
-    coordinator.out =
-        a->out.empty() ? "results/" + study.name : a->out;
+    coordinator.out = a->out.empty() ? "results/" + study.name : a->out;
     if (!coordinator.out.has_filename()) coordinator.out = coordinator.out.parent_path();  // DIR/ means DIR
     coordinator.resume = a->resume;
     coordinator.replace = a->replace;

@@ -2,20 +2,18 @@
 // order.
 //
 // A mode M provides, besides its names and its error bound:
-//   M::Real                         format of the screen vertices that geometry hands over
-//   M::Prepared                     what is computed once per triangle; holds `box`, the pixels it can cover
-//   M::prepare(triangle, fill, rank) -> Prepared; a triangle that draws nothing has an empty box
-//   M::inside_edge(prepared, e, x, y)  one of the three edge tests at the sample of pixel (x, y); along a
-//   row, the
-//                                   pixels that pass form one half-line (monotone), so that spans can be
-//                                   searched
-//   M::inside(prepared, x, y)       all three edge tests; covers(prepared, x, y) is inside() within the box
-//   M::depth(prepared, x, y)        depth at the sample; always within the depths of the corners
-//   M::Key, M::key(depth, rank)     keys order fragments: the smallest key owns a pixel
-//   M::kClear                       key of an empty pixel: every fragment with depth < 1 is smaller
+//   M::Real       format of the screen vertices that geometry hands over
+//   M::Prepared   what is computed once per triangle; holds `box`, the pixels it can cover
+//   M::prepare(triangle, fill, rank)   gives a Prepared; a triangle that draws nothing has an empty box
+//   M::inside_edge(prepared, e, x, y)  edge test e of three at the sample of pixel (x, y); in a row, the
+//                 pixels that pass form one half-line (monotone), so that spans can be searched
+//   M::inside(prepared, x, y)   all three edge tests; covers(prepared, x, y) is inside() within the box
+//   M::depth(prepared, x, y)    depth at the sample; always within the depths of the corners
+//   M::Key, M::key(depth, rank) keys order fragments: the smallest key owns a pixel
+//   M::kClear     key of an empty pixel: every fragment with depth < 1 is smaller
 //   M::output_depth(key), M::rank(key)  what resolve needs back
-// No fused multiply-add, no approximate reciprocal: a mode's bits are the same on every CPU (design,
-// Invariant 0).
+//
+// No fused multiply-add, no approximate reciprocal: a mode's bits are the same on every CPU (Invariant 0).
 #pragma once
 
 #include <algorithm>
