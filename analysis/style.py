@@ -30,6 +30,7 @@ RC = {
     "axes.spines.top": False, "axes.spines.right": False, "axes.linewidth": 0.7, "axes.axisbelow": True,
     "grid.color": "#D9D9D9", "grid.linewidth": 0.5, "lines.linewidth": 1.1, "lines.markersize": 4.5,
     "errorbar.capsize": 1.6, "hatch.linewidth": 0.5, "savefig.facecolor": "white", "figure.facecolor": "white",
+    "text.parse_math": False,  # a name with two dollars is a name
     "pdf.fonttype": 42,
     # The same records give the same bytes: no random ids, no dates. Text as paths looks alike everywhere.
     "svg.hashsalt": "rasterbench", "svg.fonttype": "path",

@@ -43,10 +43,13 @@ std::vector<CgroupMemory> cgroup_limits() {
   std::vector<CgroupMemory> limits;
   std::ifstream groups("/proc/self/cgroup");
   for (std::string line; std::getline(groups, line);) {
+    // ID:CONTROLLERS:PATH; the path may hold colons too.
+    const std::size_t first = line.find(':'), second = line.find(':', first + 1);
+    if (second == std::string::npos) continue;
     const bool version_2 = line.starts_with("0::");
-    if (!version_2 && line.find(":memory:") == std::string::npos) continue;
+    if (!version_2 && line.substr(first + 1, second - first - 1) != "memory") continue;
     const std::string root = version_2 ? "/sys/fs/cgroup" : "/sys/fs/cgroup/memory";
-    for (std::filesystem::path group = line.substr(line.rfind(':') + 1);; group = group.parent_path()) {
+    for (std::filesystem::path group = line.substr(second + 1);; group = group.parent_path()) {
       const std::string folder = root + group.string() + "/";
       constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
       const std::size_t limit =

@@ -46,9 +46,8 @@ class Coordinator {
         std::filesystem::exists(journal_path) ? read_journal(journal_path) : std::vector<Json>{};
     const bool resumed = !events.empty();
     if (resumed) replay(events, start, journal_path, states_);
-    for (const Json& event : events)
-      first_launch_ += event.at("event") == "resume" ? study_.sampling.launches : 0;
-    if (resumed) first_launch_ += study_.sampling.launches;  // its processes are new ones
+    for (const PointState& state : states_)  // the processes of a resumed study are new ones
+      for (const Sample& sample : state.samples) next_launch_ = std::max(next_launch_, sample.launch + 1);
     journal_ = std::make_unique<Journal>(journal_path);
     Json event = resumed ? Json{{"event", "resume"}} : start;
     event["at"] = utc_now();
@@ -71,16 +70,12 @@ class Coordinator {
       throw InputError({.file = options_.out.string(), .field = "--out"},
                        "holds a study already; add --resume to continue it or --replace to start afresh");
     if (options_.resume) return lock;
-    // One finished study is kept as DIR.previous; an unfinished one does not push it out.
-    const std::filesystem::path previous = options_.out.string() + ".previous";
+    // Nothing is ever deleted: the old folder takes the first free name.
+    std::filesystem::path previous = options_.out.string() + ".previous";
+    for (int copy = 2; std::filesystem::exists(previous); ++copy)
+      previous = fmt::format("{}.previous-{}", options_.out.string(), copy);
     std::error_code error;
-    const bool finished = std::filesystem::exists(options_.out / "records.jsonl");
-    if (!finished && std::filesystem::exists(previous / "records.jsonl")) {
-      std::filesystem::remove_all(options_.out, error);
-    } else {
-      std::filesystem::remove_all(previous, error);
-      if (!error) std::filesystem::rename(options_.out, previous, error);  // its lock goes with it
-    }
+    std::filesystem::rename(options_.out, previous, error);  // its lock goes with it
     if (error) throw InputError({.file = options_.out.string(), .field = "--replace"}, error.message());
     return make_and_lock(options_.out);
   }
@@ -255,9 +250,13 @@ class Coordinator {
 
   void take_sample(PointState& state, int block) {
     const Point& point = state.planned->point;
-    const int launch = first_launch_ + block % study_.sampling.launches;
-    auto& processes = runners_[launch];
+    const int slot = block % study_.sampling.launches;
+    auto& processes = runners_[slot];
     try {
+      const auto& old = processes[point.environment];
+      const bool restarted = old && !old->alive();
+      if (restarted || !launch_of_.contains(slot)) launch_of_[slot] = next_launch_++;
+      const int launch = launch_of_[slot];
       Process& process = runner(processes, point.environment);
       if (&process != running_ && running_ && running_->alive()) running_->pause();
       running_ = &process;
@@ -363,9 +362,11 @@ class Coordinator {
   std::vector<PointState> states_;
   std::unique_ptr<Journal> journal_;
   std::map<Environment, std::unique_ptr<Process>> verifiers_;
-  std::map<int, std::map<Environment, std::unique_ptr<Process>>> runners_;  // by launch
+  std::map<int, std::map<Environment, std::unique_ptr<Process>>> runners_;  // by slot
   Process* running_ = nullptr;
-  int first_launch_ = 0;  // of this run of the study: a resumed one has launches of its own
+  std::map<int, int>
+      launch_of_;  // by slot: a launch is a process, so a restarted one has a number of its own
+  int next_launch_ = 0;
   Progress progress_;
 };
 

@@ -130,7 +130,10 @@ Json Process::ask(const Json& request, double timeout_seconds) {
   }
   const std::string text = read_line(timeout_seconds);
   const Json answer = Json::parse(text, nullptr, false);
-  if (answer.is_discarded()) throw ProcessError("runner process answered: " + text.substr(0, 200));
+  if (answer.is_discarded()) {  // whatever it says next would be the answer to another question
+    kill_and_reap();
+    throw ProcessError("runner process answered: " + text.substr(0, 200));
+  }
   if (answer.contains("error")) throw ProcessError(answer.at("error").get<std::string>());
   return answer;
 }

@@ -2,7 +2,6 @@
 
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -13,6 +12,8 @@
 #include "harness/verify.h"
 #include "kernels/kernel.h"
 #include "scene/image.h"
+
+extern char** environ;
 
 namespace rasterbench {
 namespace {
@@ -28,14 +29,17 @@ class CollectingReporter final : public benchmark::BenchmarkReporter {
   Run last;
 };
 
-/// Reads and writes four times what the last-level cache holds, so that nothing of the point is left in it.
-void sweep_caches() {
-  static std::vector<std::uint64_t> sink(
-      std::max(std::size_t{64} << 20,
-               4 * static_cast<std::size_t>(std::max(0L, sysconf(_SC_LEVEL3_CACHE_SIZE)))) /
-          8,
-      1);
-  for (std::size_t i = 0; i < sink.size(); i += 8) sink[i] += 1;
+/// Every worker reads and writes its share of a buffer that is larger than the caches, so that little of the
+/// point is left in a last-level cache of up to kSweepBytes or in the workers' own.
+void sweep_caches(Execution& execution) {
+  constexpr std::size_t kSweepBytes = std::size_t{256} << 20, kShareBytes = std::size_t{16} << 20;
+  static std::vector<std::uint64_t> sink(kSweepBytes / sizeof(std::uint64_t), 1);
+  const std::int64_t shares = kSweepBytes / kShareBytes;
+  execution.uniform_loop(shares, [&](std::int64_t share, int) {
+    const std::size_t size = kShareBytes / sizeof(std::uint64_t),
+                      first = static_cast<std::size_t>(share) * size;
+    for (std::size_t i = first; i < first + size; i += 8) sink[i] += 1;  // one word a cache line
+  });
   benchmark::DoNotOptimize(sink.data());
 }
 
@@ -63,14 +67,12 @@ class Runner {
   Json sample(const Point& point, const std::string& name, int frames) {
     const Scene& drawn = scene(point.scene);
     Json answer;
-    {
-      const auto probe = make_execution(point.execution);
-      answer["threads_observed"] = observe_threads(*probe).count;
-    }
+    const auto probe = make_execution(point.execution);
+    answer["threads_observed"] = observe_threads(*probe).count;
     const auto renderer =
         make_renderer(point.kernel, point.numeric, {&drawn, point.settings(), point.execution});
     renderer->draw();
-    if (point.cache == "cold") sweep_caches();
+    if (point.cache == "cold") sweep_caches(*probe);
 
     StageSeconds stages;
     std::vector<WorkerTally> tally;
@@ -144,9 +146,12 @@ std::map<std::string, std::string> environment_variables(const Environment& envi
   variables["OMP_WAIT_POLICY"] = environment.wait_policy == "default" ? "" : environment.wait_policy;
   variables["OMP_DYNAMIC"] = "false";
   // What would change a schedule or a thread count behind the study's back.
-  for (const char* name : {"OMP_SCHEDULE", "OMP_NUM_THREADS", "GOMP_CPU_AFFINITY", "KMP_AFFINITY",
-                           "BENCHMARK_REPETITIONS", "BENCHMARK_MIN_TIME", "BENCHMARK_FILTER"})
+  for (const char* name : {"OMP_SCHEDULE", "OMP_NUM_THREADS", "GOMP_CPU_AFFINITY", "KMP_AFFINITY"})
     variables[name] = "";
+  // Google Benchmark takes its options from these too; the study's are given as arguments.
+  for (char** variable = environ; *variable; ++variable)
+    if (const std::string text(*variable); text.starts_with("BENCHMARK_"))
+      variables[text.substr(0, text.find('='))] = "";
   if (environment.runtime == "libomp") {
     const std::string path = find_libomp();
     if (path.empty()) throw InputError("LLVM's OpenMP runtime (libomp) is not installed on this machine");

@@ -167,7 +167,9 @@ void add_study_command(CLI::App& app, Outcome& outcome, const std::vector<std::s
   command->add_option("--shard", a->shard,
                       "I/N: only the I-th of N parts; points that differ in threads stay together");
   command->add_flag("--resume", a->resume, "continue an interrupted study from its journal");
-  command->add_flag("--replace", a->replace, "start afresh; the old folder is kept as DIR.previous")
+  command
+      ->add_flag("--replace", a->replace,
+                 "start afresh; the old folder is kept as DIR.previous, DIR.previous-2, ...")
       ->excludes("--resume");
   command->add_flag("--dry-run", a->dry_run, "print the points and what would be skipped, run nothing");
   command->add_flag("--list", a->list, "print the names of the points only");
@@ -200,6 +202,9 @@ void add_study_command(CLI::App& app, Outcome& outcome, const std::vector<std::s
     if (a->list || a->dry_run) return print_plan(study, a->list);
     coordinator.out = a->out.empty() ? "results/" + study.name : a->out;
     if (!coordinator.out.has_filename()) coordinator.out = coordinator.out.parent_path();  // DIR/ means DIR
+    if (std::filesystem::exists(coordinator.out) && a->replace)
+      coordinator.out =
+          std::filesystem::canonical(coordinator.out);  // what a link points to is what is replaced
     coordinator.resume = a->resume;
     coordinator.replace = a->replace;
     outcome.exit_code = run_study(study, options, coordinator);

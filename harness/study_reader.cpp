@@ -289,6 +289,8 @@ Study read_study_file(const std::filesystem::path& path) {
   TableReader reader(table, study.file);
   study.name = path.stem().string();
   reader.text("name", study.name);
+  if (study.name.empty() || study.name.starts_with('.') || study.name.find('/') != std::string::npos)
+    reader.fail(*table.get("name"), "name", "must be a file name: its results go into results/NAME");
   reader.text("question", study.question);
   reader.integer("seed", 0, std::numeric_limits<std::int64_t>::max(), study.seed);
   if (const toml::node* node = reader.find("sampling")) {

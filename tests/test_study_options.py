@@ -129,11 +129,15 @@ def snapshot_of(whole: dict[str, bytes | None], folder: Path) -> dict[str, bytes
     return {str(Path(name).relative_to(folder)): data for name, data in whole.items() if Path(name).is_relative_to(folder) and Path(name) != folder}
 
 
-def test_replace_keeps_one_previous_study(folder: Path) -> None:
+def test_replace_deletes_nothing(folder: Path) -> None:
+    (folder / "out.previous-2").mkdir()
+    (folder / "out.previous-2/thesis.txt").write_text("precious")
     for kept in ("serial", "static", "dynamic"):
         study(folder, "--out", "out", "--filter", kept, "--replace").ok()
-    assert "dynamic" in records(folder / "out")[0]["name"] and "static" in records(folder / "out.previous")[0]["name"]
-    assert sorted(os.listdir(folder)) == ["out", "out.previous", "tiny.toml"]
+    for name, kept in (("out", "dynamic"), ("out.previous", "serial"), ("out.previous-3", "static")):
+        assert kept in records(folder / name)[0]["name"]
+    assert (folder / "out.previous-2/thesis.txt").read_text() == "precious"
+    assert sorted(os.listdir(folder)) == ["out", "out.previous", "out.previous-2", "out.previous-3", "tiny.toml"]
 
 
 def test_bad_input_does_not_replace(folder: Path) -> None:

@@ -176,3 +176,22 @@ def test_large_differences_are_told_apart_with_few_samples():
     _, comparisons = s.compare_with_best(group)
     assert [c.verdict for c in comparisons] == ["best"] + ["slower"] * 39
     assert {c.test for c in comparisons[1:]} == {s.WELCH}
+
+
+def test_launches_that_differ_are_not_taken_for_points_that_differ() -> None:
+    rng = np.random.default_rng(5)
+    launches, blocks = np.repeat(np.arange(5), 5), np.tile(np.arange(5), 5) * 5 + np.repeat(np.arange(5), 5)
+    wrong = 0
+    for _ in range(60):
+        group = [s.Samples(10 * np.exp(rng.normal(0, 0.03, 25) + np.repeat(rng.normal(0, 0.03, 5), 5)), launches, blocks)
+                 for _ in range(12)]
+        wrong += any(c.verdict == "slower" for c in s.compare_with_best(group)[1])
+    assert wrong <= 6  # 5 % of 60, and room for chance
+
+
+def test_a_difference_that_all_launches_show_is_found() -> None:
+    rng = np.random.default_rng(6)
+    launches, blocks = np.repeat(np.arange(5), 5), np.tile(np.arange(5), 5) * 5 + np.repeat(np.arange(5), 5)
+    group = [s.Samples(mean * np.exp(rng.normal(0, 0.01, 25)), launches, blocks) for mean in (10.0, 12.0)]
+    best, comparisons = s.compare_with_best(group)
+    assert best == 0 and comparisons[1].verdict == "slower"
