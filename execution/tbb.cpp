@@ -44,7 +44,7 @@ class Tbb final : public Execution {
     std::int64_t stamped_ranges = 0;  // until `last`
     double first = 0, last = 0;
   };
-  static constexpr double kShortRange = 2e-6;  // seconds; a stamp takes about 2e-8
+  static constexpr double kShortRange = 2e-6;  // seconds
 
   template <class AnyPartitioner>
   void run(std::int64_t n, std::size_t grain, LoopBody body, AnyPartitioner& partitioner) {

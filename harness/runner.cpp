@@ -75,7 +75,7 @@ class Runner {
     if (point.cache == "cold") sweep_caches(*probe);
 
     StageSeconds stages;
-    std::vector<WorkerTally> tally;
+    const FrameReport* report = nullptr;  // of the last frame; read after the clock has stopped
     benchmark::ClearRegisteredBenchmarks();
     benchmark::RegisterBenchmark(
         name.c_str(),
@@ -84,12 +84,11 @@ class Runner {
           for ([[maybe_unused]] const auto iteration : state) {
             const auto begin = std::chrono::steady_clock::now();
             for (int frame = 0; frame < frames; ++frame) {
-              const FrameReport& report = renderer->draw();
-              stages.clear += report.seconds.clear;
-              stages.geometry += report.seconds.geometry;
-              stages.raster += report.seconds.raster;
-              stages.resolve += report.seconds.resolve;
-              tally = report.raster_tally;
+              report = &renderer->draw();
+              stages.clear += report->seconds.clear;
+              stages.geometry += report->seconds.geometry;
+              stages.raster += report->seconds.raster;
+              stages.resolve += report->seconds.resolve;
             }
             state.SetIterationTime(
                 std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
@@ -109,7 +108,7 @@ class Runner {
                         {"raster", stages.raster * per_frame_ms},
                         {"resolve", stages.resolve * per_frame_ms}};
     Json& threads = answer["per_thread"] = Json::array();
-    for (const WorkerTally& worker : tally)
+    for (const WorkerTally& worker : report->raster_tally)
       threads.push_back(
           {{"busy_ms", worker.busy_seconds * 1e3}, {"iterations", worker.iterations}, {"cpu", worker.cpu}});
     answer["picture"] = picture_hash(*renderer);

@@ -13,8 +13,8 @@
 namespace rasterbench {
 namespace {
 
-/// Seconds that a kernel which tests every pixel for every triangle needs per test; measured on one core,
-/// generous.
+/// Seconds that a kernel which tests every pixel for every triangle needs per test: 0.66e-9 on one core in
+/// the published run (results/published, all_pixels serial), rounded up.
 constexpr double kSecondsPerTest = 1.0e-9;
 
 /// Why a point will not run, or empty.
