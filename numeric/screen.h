@@ -24,11 +24,38 @@ enum class NearRule {
           ///< nothing
 };
 
+/// What the depth of a corner is. A smaller value is always nearer, so that every mode orders alike.
+enum class DepthFunction {
+  kNdc,       ///< d of the course contract: -1 on the near plane, +1 on the far plane
+  kReversed,  ///< minus reversed z: -1 on the near plane, 0 on the far plane, where floats are dense
+  kInverseW,  ///< -far / w: -far/near on the near plane, -1 on the far plane (perspective cameras only)
+};
+
+/// The value of a depth function on the far plane: what lies there or beyond is not drawn.
+constexpr double far_value(DepthFunction function) {
+  return function == DepthFunction::kNdc ? 1 : function == DepthFunction::kReversed ? 0 : -1;
+}
+
+/// A depth function's values as d: d = offset + scale * value.
+struct DepthMap {
+  double offset = 0, scale = 1;
+};
+
+/// What a triangle is drawn into: the fill rule and, for modes that work in normalised device coordinates,
+/// the image's size in pixels.
+struct SampleGrid {
+  FillRule fill;
+  int width, height;
+  SampleGrid(FillRule rule, int image_width = 1, int image_height = 1)  // NOLINT: a rule alone is a grid
+      : fill(rule), width(image_width), height(image_height) {}
+};
+
 /// All guard-banded screen coordinates are within +-kGuardBand pixels.
 inline constexpr double kGuardBand = 131072.0;  // 2^17
 
 /// A triangle after view, clipping and projection: x to the right and y down, in pixels, sample (j, i) at
-/// (j+.5, i+.5); d the depth, -1 on the near and +1 on the far plane. id is the world triangle's, shared by
+/// (j+.5, i+.5); d the value of a depth function (-1 on the near and +1 on the far plane, unless a mode asks
+/// for another). id is the world triangle's, shared by
 /// all pieces of a clipped one; id < 0 marks a slot of a triangle that draws nothing.
 template <class Real>
 struct ScreenTriangle {

@@ -1,0 +1,51 @@
+// Visibility by ray casting with Embree: an answer by another method and another team's code.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "numeric/screen.h"
+#include "reference/double_renderer.h"
+#include "scene/camera.h"
+#include "scene/model.h"
+
+namespace rasterbench {
+
+/// Whether this build has Embree, and its version or the reason why not ("Embree was not found at build
+/// time").
+bool has_embree();
+std::string embree_version();
+
+/// What the rays saw.
+struct RayCastPicture {
+  IdImage picture;           ///< ids; depths d in [-1, 1), 1 = background
+  double build_seconds = 0;  ///< acceleration structure
+  double trace_seconds = 0;  ///< all rays
+};
+
+/// One ray through each pixel's sample, from the near plane to the far plane, origin and direction computed
+/// in double and rounded once; of equal distances the smallest id. `robust`: RTC_SCENE_FLAG_ROBUST. Triangles
+/// with a non-finite corner are left out. Throws InputError naming --embree where has_embree() is false.
+RayCastPicture ray_cast(std::span<const Triangle> triangles, const Camera& camera, bool robust, int threads);
+
+/// A picture against another one by ray casting. Every pixel is in exactly one class.
+struct RayComparison {
+  std::int64_t pixels = 0;
+  std::int64_t identical = 0;       ///< same id
+  std::int64_t edge_ties = 0;       ///< the sample is within `edge_bound` pixels of an edge of one of the two
+  std::int64_t depth_ties = 0;      ///< both cover the sample, their distances within the bound of each other
+  std::int64_t errors = 0;          ///< nothing explains it
+  double edge_bound = 0;            ///< pixels; the largest used
+  double max_depth_difference = 0;  ///< of d, over pixels of equal id
+  std::int64_t worst_pixel = -1;    ///< the first error, or -1
+};
+
+/// Classifies where `ids` (drawn by a mode whose vertices have unit roundoff and snap as in `bound`) and
+/// `rays` disagree. Bounds follow from float32 ray origins and directions and are stated in embree.cpp.
+RayComparison compare_with_rays(const RayCastPicture& rays, std::span<const std::int32_t> ids,
+                                std::span<const double> depths, std::span<const Triangle> triangles,
+                                const Camera& camera, const ModeBound& bound);
+
+}  // namespace rasterbench
