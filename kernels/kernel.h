@@ -23,6 +23,8 @@ struct KernelInfo {
   bool tests_every_pixel = false;  ///< costs T x P edge tests, so that a study has to predict its time
   bool has_tiles = false;          ///< FrameSettings::tile matters to its speed
   bool hidden = false;             ///< not listed: a canary
+  /// What a numeric mode must have to suit, said of modes that do not.
+  std::string_view needs = "needs a key of one 64-bit word, which this mode's depth does not fit";
 };
 
 /// A registered kernel and the numeric modes that can carry it.
@@ -69,6 +71,10 @@ struct KernelRegistration {
     std::vector<Kernel::Variant> variants;
     for_each_mode([&]<NumericMode Mode>() {
       if constexpr (requires { typename Definition::template Strategy<Mode>; }) {
+        if (const auto reason = find_mode(Mode::kInfo.name)->unavailable; !reason.empty()) {
+          variants.push_back({Mode::kInfo.name, {}, reason});
+          return;
+        }
         variants.push_back({Mode::kInfo.name,
                             [](const RendererSetup& setup) -> std::unique_ptr<Renderer> {
                               using Strategy = typename Definition::template Strategy<Mode>;
@@ -76,10 +82,10 @@ struct KernelRegistration {
                             },
                             {}});
       } else {
-        variants.push_back(
-            {Mode::kInfo.name, {}, "needs a key of one 64-bit word, which this mode's depth does not fit"});
+        variants.push_back({Mode::kInfo.name, {}, Definition::kInfo.needs});
       }
     });
+    variants.push_back({kRayCastInfo.name, {}, "has no rays: ray_cast is a kernel of its own"});
     register_kernel(Kernel(Definition::kInfo, std::move(variants)));
   }
 };

@@ -5,10 +5,15 @@ namespace rasterbench {
 namespace {
 
 struct Null {
-  static constexpr KernelInfo kInfo{
-      .name = "null", .parallel_unit = "nothing", .synchronisation = "none", .work = "0", .hidden = true};
+  static constexpr KernelInfo kInfo{.name = "null",
+                                    .parallel_unit = "nothing",
+                                    .synchronisation = "none",
+                                    .work = "0",
+                                    .hidden = true,
+                                    .needs = "is a canary: two modes are enough"};
 
   template <NumericMode Mode>
+  requires std::same_as<Mode, F32> || std::same_as<Mode, F64>
   class Strategy {
    public:
     void draw(const StagedTriangles<Mode>&, Visibility<Mode>, Execution&) {}

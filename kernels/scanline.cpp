@@ -16,7 +16,7 @@ namespace rasterbench {
 namespace {
 
 /// Where one edge lets a row begin or end. Pixels that pass its test are [boundary, inf) or (-inf, boundary).
-template <NumericMode Mode>
+template <MonotoneMode Mode>
 class EdgeWalk {
  public:
   EdgeWalk(const typename Mode::Prepared& triangle, int edge, const PixelBox& box)
@@ -84,9 +84,10 @@ struct Scanline {
   static constexpr KernelInfo kInfo{.name = "scanline",
                                     .parallel_unit = "a band of 16 rows",
                                     .synchronisation = "none: an iteration owns its rows",
-                                    .work = "T + heights of all boxes + covered pixels"};
+                                    .work = "T + heights of all boxes + covered pixels",
+                                    .needs = "needs edge tests that split a row once, to search its spans"};
 
-  template <NumericMode Mode>
+  template <MonotoneMode Mode>
   class Strategy {
    public:
     void draw(const StagedTriangles<Mode>& in, Visibility<Mode> out, Execution& execution) {

@@ -11,9 +11,11 @@ struct Stale {
                                     .parallel_unit = "a triangle, in the first frame",
                                     .synchronisation = "none: serial",
                                     .work = "T + B, then 0",
-                                    .hidden = true};
+                                    .hidden = true,
+                                    .needs = "is a canary: two modes are enough"};
 
   template <NumericMode Mode>
+  requires std::same_as<Mode, F32> || std::same_as<Mode, F64>
   class Strategy {
    public:
     void draw(const StagedTriangles<Mode>& in, Visibility<Mode> out, Execution&) {

@@ -3,21 +3,31 @@
 //
 // A mode M provides, besides its names and its error bound:
 //   M::Real       format of the screen vertices that geometry hands over
-//   M::Prepared   what is computed once per triangle; holds `box`, the pixels it can cover
-//   M::prepare(triangle, fill, rank)   gives a Prepared; a triangle that draws nothing has an empty box
-//   M::inside_edge(prepared, e, x, y)  edge test e of three at the sample of pixel (x, y); in a row, the
-//                 pixels that pass form one half-line (monotone), so that spans can be searched
+//   M::kDepthFunction   what the depth of a vertex is
+//   M::Prepared   what is computed once per triangle; holds `box`, the pixels it can cover, and `rank`
+//   M::prepare(triangle, grid, rank)   gives a Prepared; a triangle that draws nothing has an empty box. The
+//                 triangle must outlive the keys made of it
+//   M::inside_edge(prepared, e, x, y)  edge test e of three at the sample of pixel (x, y)
+//   M::kMonotone  whether the pixels of a row that pass an edge test form one half-line, so that spans can be
+//                 searched
 //   M::inside(prepared, x, y)   all three edge tests; covers(prepared, x, y) is inside() within the box
 //   M::depth(prepared, x, y)    depth at the sample; always within the depths of the corners
 //   M::Key, M::key(depth, rank) keys order fragments: the smallest key owns a pixel
-//   M::kClear     key of an empty pixel: every fragment with depth < 1 is smaller
-//   M::output_depth(key), M::rank(key)  what resolve needs back
+//   M::kClear     key of an empty pixel: every fragment nearer than the far plane is smaller
+//   M::value(key), M::output_depth(key, map), M::rank(key)  what resolve needs back
+// and may provide, where a run of pixels is cheaper than its pixels (same results):
+//   M::inside_run(prepared, x, y, n)   bit i of the answer is inside(prepared, x + i, y); n <= 64, and the
+//   run
+//                 does not cross a column that is a multiple of 64
+//   M::depth_run(prepared, x, y, n, depths)   depths[i] = depth(prepared, x + i, y)
 //
-// No fused multiply-add, no approximate reciprocal: a mode's bits are the same on every CPU (Invariant 0).
+// A mode's bits do not depend on the strategy, the threads, the tiles or the order of triangles (Invariant
+// 0); ModeInfo says where they may depend on the CPU or the compiler.
 #pragma once
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <compare>
 #include <concepts>
 #include <cstdint>
@@ -58,14 +68,45 @@ inline double decode(std::uint64_t code) {
 }
 
 /// (depth, rank) in 64 bits: encode(depth) << 32 | rank. Ordered as an integer, so that one atomic minimum
-/// decides a pixel.
-struct PackedKeys {
+/// decides a pixel. A depth of a wider format is rounded once.
+template <DepthFunction Function>
+struct PackedFloatKeys {
   using Key = std::uint64_t;
-  static constexpr Key kClear = (std::uint64_t{0xbf800000u} << 32) - 1;  // 0xbf800000 = encode(1.0f)
-  static Key key(float depth, std::uint32_t rank) { return std::uint64_t{encode(depth)} << 32 | rank; }
-  static float output_depth(Key key) {
-    return key == kClear ? 1.0f : decode(static_cast<std::uint32_t>(key >> 32));
+  static constexpr DepthFunction kDepthFunction = Function;
+  static constexpr float kFar = static_cast<float>(far_value(Function));
+  // encode(kFar), of 1, 0 and -1: encode() itself is no constant expression, since it adds zeros.
+  static constexpr Key kFarCode = kFar > 0 ? 0xbf800000u : kFar < 0 ? 0x407fffffu : 0x80000000u;
+  static constexpr Key kClear = (kFarCode << 32) - 1;
+  template <class Depth>
+  static Key key(Depth depth, std::uint32_t rank) {
+    return Key{encode(static_cast<float>(depth))} << 32 | rank;
   }
+  static double value(Key key) {
+    return key == kClear ? double{kFar} : double{decode(static_cast<std::uint32_t>(key >> 32))};
+  }
+  static float output_depth(Key key, const DepthMap& map = {}) {
+    if (key == kClear) return 1.0f;
+    const float depth = decode(static_cast<std::uint32_t>(key >> 32));
+    if constexpr (Function == DepthFunction::kNdc) return depth;
+    return static_cast<float>(map.offset + map.scale * double{depth});
+  }
+  static std::uint32_t rank(Key key) { return static_cast<std::uint32_t>(key); }
+};
+using PackedKeys = PackedFloatKeys<DepthFunction::kNdc>;
+
+/// (depth, rank) in 64 bits, the depth d in fixed point: round((d + 1) / 2 * (2^Bits - 1)), ties to even.
+template <int Bits>
+struct UnormKeys {
+  using Key = std::uint64_t;
+  static constexpr DepthFunction kDepthFunction = DepthFunction::kNdc;
+  static constexpr std::uint32_t kMax = static_cast<std::uint32_t>((std::uint64_t{1} << Bits) - 1);
+  static constexpr Key kClear = (Key{kMax} << 32) - 1;
+  static Key key(double depth, std::uint32_t rank) {
+    const double unit = std::clamp(depth * 0.5 + 0.5, 0.0, 1.0);  // -1 lies on the near plane, give or take
+    return static_cast<Key>(std::nearbyint(unit * kMax)) << 32 | rank;
+  }
+  static double value(Key key) { return key == kClear ? 1 : static_cast<double>(key >> 32) / kMax * 2 - 1; }
+  static float output_depth(Key key, const DepthMap& = {}) { return static_cast<float>(value(key)); }
   static std::uint32_t rank(Key key) { return static_cast<std::uint32_t>(key); }
 };
 
@@ -77,38 +118,60 @@ struct WideKey {
 };
 struct WideKeys {
   using Key = WideKey;
+  static constexpr DepthFunction kDepthFunction = DepthFunction::kNdc;
   static constexpr Key kClear{0xbff0000000000000u - 1, 0xffffffffu};  // 0xbff0... = encode(1.0)
   static Key key(double depth, std::uint32_t rank) { return {encode(depth), rank}; }
-  static float output_depth(const Key& key) {
-    return key == kClear ? 1.0f : static_cast<float>(decode(key.depth));
-  }
+  static double value(const Key& key) { return key == kClear ? 1 : decode(key.depth); }
+  static float output_depth(const Key& key, const DepthMap& = {}) { return static_cast<float>(value(key)); }
   static std::uint32_t rank(const Key& key) { return key.rank; }
 };
 
 /// Names and promises of a mode, for lists and reports.
 struct ModeInfo {
   std::string_view name;
-  std::string_view vertices;  ///< format of the screen vertices
-  std::string_view edges;     ///< arithmetic of the edge functions
-  std::string_view depth;     ///< arithmetic and format of the depth
-  std::string_view bound;     ///< the error bound in words
-  ModeBound numbers;          ///< the same for the machine
+  std::string_view vertices;      ///< format of the screen vertices
+  std::string_view edges;         ///< arithmetic of the edge functions
+  std::string_view depth;         ///< arithmetic and format of the depth
+  std::string_view bound;         ///< the error bound in words
+  std::string_view bound_source;  ///< where the bound comes from
+  ModeBound numbers = {};         ///< the same for the machine
+  DepthFunction depth_function = DepthFunction::kNdc;
+  /// The same bits on every CPU and from every compiler that keeps to IEEE 754; if not, the bits are stable
+  /// on one type of CPU and one compiler. (The same bits whatever the threads, tiles and order: always.)
+  bool same_on_every_cpu = true;
+  bool has_screen_triangles = true;   ///< false: rays are cast, so that the oracle has nothing to judge
+  std::string_view unavailable = {};  ///< why this CPU or this build cannot run the mode, or empty
 };
 
 template <class Mode>
 concept NumericMode = requires(const ScreenTriangle<typename Mode::Real>& triangle,
                                const typename Mode::Prepared& prepared, typename Mode::Key key) {
-  { Mode::prepare(triangle, FillRule::kClosed, std::uint32_t{}) } -> std::same_as<typename Mode::Prepared>;
+  {
+    Mode::prepare(triangle, SampleGrid{FillRule::kClosed}, std::uint32_t{})
+    } -> std::same_as<typename Mode::Prepared>;
   { Mode::inside_edge(prepared, 0, 0, 0) } -> std::same_as<bool>;
   { Mode::inside(prepared, 0, 0) } -> std::same_as<bool>;
   { Mode::key(Mode::depth(prepared, 0, 0), std::uint32_t{}) } -> std::same_as<typename Mode::Key>;
-  { Mode::output_depth(key) } -> std::same_as<float>;
+  { Mode::output_depth(key, DepthMap{}) } -> std::same_as<float>;
+  { Mode::value(key) } -> std::same_as<double>;
+  { Mode::kDepthFunction } -> std::convertible_to<DepthFunction>;
+  { Mode::kMonotone } -> std::convertible_to<bool>;
   { prepared.box } -> std::convertible_to<PixelBox>;
 };
 
 /// Modes whose key is one 64-bit word.
 template <class Mode>
 concept PackedKeyMode = NumericMode<Mode> && std::same_as<typename Mode::Key, std::uint64_t>;
+
+/// Modes whose edge tests split a row once.
+template <class Mode>
+concept MonotoneMode = NumericMode<Mode> && Mode::kMonotone;
+
+/// Modes that offer runs of pixels.
+template <class Mode>
+concept RunMode = NumericMode<Mode> && requires(const typename Mode::Prepared& prepared) {
+  { Mode::inside_run(prepared, 0, 0, 1) } -> std::same_as<std::uint64_t>;
+};
 
 /// The specification of coverage: the bounding box is part of it.
 template <NumericMode Mode>
@@ -138,26 +201,67 @@ ScreenTriangle<Real> canonical(ScreenTriangle<Real> t) {
   return t;
 }
 
-/// The plane through three corners, evaluated as clamp((d0 + gy dy) + gx dx): anchored at the first corner
-/// and clamped to the corners' depths because rounding would leave them (accuracy.md, section 1). Units of
-/// dx, dy are the caller's.
+/// The edges of a triangle in canonical order: both triangles at an edge then see it run the same way.
+inline constexpr int kEdgeFrom[3] = {0, 1, 0};
+inline constexpr int kEdgeTo[3] = {1, 2, 2};
+
+/// Whether the sign of edge e is turned so that the inside is positive: edge 02 runs against the loop
+/// 0 -> 1 -> 2 -> 0.
+constexpr bool is_flipped(bool area_is_negative, int e) { return area_is_negative != (e == 2); }
+
+/// Top-left: whether a sample on an edge with direction (dx, dy), the inside turned positive, belongs to the
+/// triangle. y points down: the inside is to the right of an edge where dy < 0 (a left edge), below a level
+/// one where dx > 0.
+template <class Number>
+constexpr bool owns_edge(Number dx, Number dy) {
+  return dy < 0 || (dy == 0 && dx > 0);
+}
+
+/// Pixels whose samples lie within the corners' extents, edges included. Subtracting one half in double is
+/// exact wherever the result can decide a pixel of the image.
 template <class Real>
-struct DepthPlane {
-  Real d0, gx, gy, low, high;
+PixelBox sample_box(const ScreenTriangle<Real>& t) {
+  const double low_x = std::min({t.x[0], t.x[1], t.x[2]}), high_x = std::max({t.x[0], t.x[1], t.x[2]});
+  const double low_y = std::min({t.y[0], t.y[1], t.y[2]}), high_y = std::max({t.y[0], t.y[1], t.y[2]});
+  return {static_cast<std::int32_t>(std::ceil(low_x - 0.5)),
+          static_cast<std::int32_t>(std::ceil(low_y - 0.5)),
+          static_cast<std::int32_t>(std::floor(high_x - 0.5)) + 1,
+          static_cast<std::int32_t>(std::floor(high_y - 0.5)) + 1};
+}
 
-  /// (x1, y1) and (x2, y2) are corners 1 and 2 relative to corner 0; area2 = x1 y2 - y1 x2, not zero.
-  static DepthPlane through(const Real (&d)[3], Real x1, Real y1, Real x2, Real y2, Real area2) {
-    const Real d1 = d[1] - d[0];
-    const Real d2 = d[2] - d[0];
-    return {d[0], (d1 * y2 - d2 * y1) / area2, (d2 * x1 - d1 * x2) / area2, std::min({d[0], d[1], d[2]}),
-            std::max({d[0], d[1], d[2]})};
+/// A mode of an edge arithmetic and a depth arithmetic. Edges has Real, Setup, kMonotone, corners() (the
+/// canonical and, for fixed point, snapped triangle), setup() (false: draws nothing), box() and
+/// inside_edge(); Depth is as in depth.h.
+template <class Edges, class Depth>
+struct Combined : Depth::Keys {
+  using Real = typename Edges::Real;
+  static constexpr bool kMonotone = Edges::kMonotone;
+
+  struct Prepared : Edges::Setup {
+    PixelBox box;
+    typename Depth::Setup plane;
+    std::uint32_t rank;
+  };
+
+  static Prepared prepare(const ScreenTriangle<Real>& triangle, const SampleGrid& grid, std::uint32_t rank) {
+    const ScreenTriangle<Real> t = Edges::corners(triangle);
+    Prepared p{};
+    p.rank = rank;
+    if (!Edges::setup(t, grid, p)) return p;  // draws nothing: the box stays empty
+    p.box = sample_box(t);
+    p.plane = Depth::setup(t);
+    return p;
   }
 
-  Real at(Real dx, Real dy) const {
-    const Real d = (d0 + gy * dy) + gx * dx;
-    const Real raised = d > low ? d : low;  // a NaN (0 times an overflown gradient) becomes low
-    return raised < high ? raised : high;
+  static bool inside_edge(const Prepared& p, int e, std::int32_t x, std::int32_t y) {
+    return Edges::inside_edge(p, e, x, y);
   }
+
+  static bool inside(const Prepared& p, std::int32_t x, std::int32_t y) {
+    return inside_edge(p, 0, x, y) && inside_edge(p, 1, x, y) && inside_edge(p, 2, x, y);
+  }
+
+  static auto depth(const Prepared& p, std::int32_t x, std::int32_t y) { return Depth::at(p.plane, x, y); }
 };
 
 }  // namespace rasterbench

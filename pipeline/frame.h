@@ -31,6 +31,7 @@ struct FrameSettings {
   int tile = 64;  ///< side of the tiles in pixels, for the kernels that have tiles; never changes the picture
 
   PixelBox bounds() const { return {0, 0, width, height}; }
+  SampleGrid grid() const { return {fill, width, height}; }
   std::size_t pixels() const { return static_cast<std::size_t>(width) * static_cast<std::size_t>(height); }
 };
 
@@ -53,7 +54,7 @@ struct StagedTriangles {
     const auto& triangle = triangles[static_cast<std::size_t>(i)];
     if (triangle.id < 0) return {};
     auto prepared =
-        Mode::prepare(triangle, settings.fill,
+        Mode::prepare(triangle, settings.grid(),
                       swap_rank(settings.tie, triangle_count, static_cast<std::uint32_t>(triangle.id)));
     prepared.box = intersect(prepared.box, settings.bounds());
     return prepared;
@@ -99,6 +100,10 @@ class Renderer {
   /// Ids of the visible triangles of the last frame, -1 = background: read back from the keys, outside the
   /// timed frame.
   virtual std::vector<std::int32_t> ids() const = 0;
+
+  /// Depth values of the last frame as the mode stores them, of its depth function, far_value() where there
+  /// is no triangle: more than depths() can say where the format is not float32 d. Read back like ids().
+  virtual std::vector<double> values() const = 0;
 
   /// Bytes of all buffers of the point.
   virtual std::size_t bytes() const = 0;

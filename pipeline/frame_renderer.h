@@ -91,6 +91,7 @@ class FrameRenderer final : public Renderer {
       : scene_(*setup.scene),
         settings_(checked(setup.settings)),
         camera_(sized_camera(scene_, settings_)),
+        depth_map_(depth_map(camera_, Mode::kDepthFunction)),
         permutation_seed_(setup.permutation_seed),
         execution_(make_execution(setup.execution)),
         screen_(scene_.model.triangles.size()),
@@ -108,8 +109,8 @@ class FrameRenderer final : public Renderer {
       });
     });
     report_.seconds.geometry = timed([&] {
-      screen_.transform(scene_.model.triangles, make_screen_transform(camera_), settings_.geometry,
-                        *execution_);
+      screen_.transform(scene_.model.triangles, make_screen_transform(camera_, Mode::kDepthFunction),
+                        settings_.geometry, *execution_);
     });
     if (permutation_seed_ != 0) screen_.shuffle(permutation_seed_);
     execution_->reset_tally();
@@ -120,8 +121,8 @@ class FrameRenderer final : public Renderer {
     report_.raster_tally.assign(execution_->tally().begin(), execution_->tally().end());
     report_.seconds.resolve = timed([&] {
       execution_->uniform_loop(settings_.height, [&](std::int64_t y, int) {
-        resolve_row<Mode>(visibility.row(y), width, scene_, settings_.tie, colours_.data() + y * width,
-                          depths_.data() + y * width);
+        resolve_row<Mode>(visibility.row(y), width, scene_, settings_.tie, depth_map_,
+                          colours_.data() + y * width, depths_.data() + y * width);
       });
     });
     report_.counts = screen_.counts();
@@ -135,9 +136,15 @@ class FrameRenderer final : public Renderer {
     std::vector<std::int32_t> ids(keys_.size(), -1);
     const auto count = static_cast<std::int64_t>(scene_.model.triangles.size());
     for (std::size_t i = 0; i < ids.size(); ++i)
-      if (keys_[i] != Mode::kClear)
+      if (!(keys_[i] == Mode::kClear))
         ids[i] = static_cast<std::int32_t>(swap_rank(settings_.tie, count, Mode::rank(keys_[i])));
     return ids;
+  }
+
+  std::vector<double> values() const override {
+    std::vector<double> values(keys_.size());
+    std::transform(keys_.data(), keys_.data() + keys_.size(), values.begin(), Mode::value);
+    return values;
   }
 
   std::size_t bytes() const override {
@@ -166,6 +173,7 @@ class FrameRenderer final : public Renderer {
   const Scene& scene_;
   FrameSettings settings_;
   Camera camera_;
+  DepthMap depth_map_;
   std::uint64_t permutation_seed_;
   std::unique_ptr<Execution> execution_;
   ScreenTriangles<typename Mode::Real> screen_;

@@ -5,6 +5,8 @@
 #include <bit>
 #include <cmath>
 
+#include "base/error.h"
+
 namespace rasterbench {
 namespace {
 
@@ -76,13 +78,13 @@ Polygon cut(const Polygon& polygon, Distance distance, OnPlane on_plane) {
   return kept;
 }
 
-Polygon cut_at_near(const Polygon& polygon, double near_w) {
+Polygon cut_at_near(const Polygon& polygon, const ScreenTransform& t) {
   return cut(
       polygon, [](const Corner& c) { return c.near_distance; },
-      [near_w](Corner& c) {
-        if (near_w > 0) c.w = near_w;  // between two huge corners rounding would leave nothing of it
+      [&t](Corner& c) {
+        if (t.near_w > 0) c.w = t.near_w;  // between two huge corners rounding would leave nothing of it
         c.near_distance = 0;
-        c.z = -c.w;  // d = -1 exactly
+        c.z = t.near_depth * c.w;  // d = -1 exactly
       });
 }
 
@@ -159,12 +161,13 @@ bool to_screen(const Triangle& triangle, const ScreenTransform& transform, const
 
   bool near_clipped = false, guard_clipped = false;
   if (options.near_rule == NearRule::kClip && any([](const Corner& c) { return c.near_distance < 0; })) {
-    polygon = cut_at_near(polygon, transform.near_w);
+    polygon = cut_at_near(polygon, transform);
     near_clipped = true;
   }
   // Without the clip a corner at w <= 0 has no place on the screen; with it, only rounding can leave one.
   if (polygon.size < 3 || any([](const Corner& c) { return !(c.w > 0); })) return ++counts.behind_near, false;
-  if (!any([](const Corner& c) { return c.z < c.w; })) return ++counts.beyond_far, false;
+  if (!any([&](const Corner& c) { return c.z < transform.far_depth * c.w; }))
+    return ++counts.beyond_far, false;
   if (any(beyond_guard_band)) {
     polygon = cut_at_guard_band(polygon);
     guard_clipped = true;
@@ -192,7 +195,9 @@ bool to_screen(const Triangle& triangle, const ScreenTransform& transform, const
 
 }  // namespace
 
-ScreenTransform make_screen_transform(const Camera& camera) {
+ScreenTransform make_screen_transform(const Camera& camera, DepthFunction function) {
+  if (function == DepthFunction::kInverseW && !camera.perspective)
+    throw Error("1/w is no depth of a camera without perspective: it is the same everywhere");
   const Viewport& viewport = camera.viewport;
   const double width = viewport.width, height = viewport.height;
   const bool centre = viewport.sampling == Sampling::kCentre;
@@ -204,12 +209,23 @@ ScreenTransform make_screen_transform(const Camera& camera) {
   };
   return {combine(span_x / 2, camera.x, span_x / 2 + offset, camera.w),
           combine(-span_y / 2, camera.y, span_y / 2 + offset, camera.w),
-          camera.z,
+          function == DepthFunction::kNdc        ? camera.z
+          : function == DepthFunction::kReversed ? camera.reversed_z
+                                                 : AffineRow{0, 0, 0, -camera.far_plane},
           camera.w,
           camera.near_distance,
           camera.near_w,
+          function == DepthFunction::kInverseW ? -camera.far_plane / camera.near_plane : -1,
+          far_value(function),
           width,
           height};
+}
+
+DepthMap depth_map(const Camera& camera, DepthFunction function) {
+  if (function == DepthFunction::kNdc) return {0, 1};
+  if (function == DepthFunction::kReversed) return {1, 2};  // reversed z is (1 - d) / 2
+  const double n = camera.near_plane, f = camera.far_plane;
+  return {(f + n) / (f - n), 2 * n / (f - n)};  // d = ((f + n) w - 2 n f) / ((f - n) w)
 }
 
 GeometryCounts& GeometryCounts::operator+=(const GeometryCounts& other) {

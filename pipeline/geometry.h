@@ -13,13 +13,19 @@
 namespace rasterbench {
 
 /// A camera with its viewport folded in, computed once per frame in double: rows of an affine map from world
-/// points to (x w, y w, z, w), x and y in pixels, and the distance in front of the near plane.
+/// points to (x w, y w, z, w), x and y in pixels and z / w the depth, and the distance in front of the near
+/// plane.
 struct ScreenTransform {
   AffineRow x, y, z, w, near_distance;
-  double near_w;         ///< Camera::near_w
-  double width, height;  ///< of the image in pixels
+  double near_w;                 ///< Camera::near_w
+  double near_depth, far_depth;  ///< the depth function's values on the near and the far plane
+  double width, height;          ///< of the image in pixels
 };
-ScreenTransform make_screen_transform(const Camera& camera);
+/// Throws Error for DepthFunction::kInverseW of a camera without perspective.
+ScreenTransform make_screen_transform(const Camera& camera, DepthFunction function = DepthFunction::kNdc);
+
+/// How the depth d of the course contract follows from the values of a depth function.
+DepthMap depth_map(const Camera& camera, DepthFunction function);
 
 /// Choices of the stage.
 struct GeometryOptions {
@@ -34,7 +40,7 @@ struct GeometryCounts {
   std::int64_t zero_area = 0;   ///< the cross product of two edges is exactly zero in double
   std::int64_t behind_near =
       0;  ///< wholly in front of the near plane (or, with NearRule::kOff, a corner at w <= 0)
-  std::int64_t beyond_far = 0;   ///< every corner at d >= 1
+  std::int64_t beyond_far = 0;   ///< every corner on or beyond the far plane
   std::int64_t off_screen = 0;   ///< the box of its corners misses the image
   std::int64_t back_facing = 0;  ///< counted only when culled
   std::int64_t drawn = 0;

@@ -20,10 +20,10 @@ inline std::uint32_t pack_rgba(const Rgb& colour) {
 std::uint32_t shade_flat(const Triangle& triangle, const Rgb& colour);
 
 /// Resolves row y: reads keys, writes colours and depths, `width` of each. A triangle is shaded once per run
-/// of its pixels.
+/// of its pixels. `map` takes the mode's depth values to d.
 template <NumericMode Mode>
 void resolve_row(const typename Mode::Key* keys, int width, const Scene& scene, TieRule tie,
-                 std::uint32_t* colours, float* depths) {
+                 const DepthMap& map, std::uint32_t* colours, float* depths) {
   const auto& triangles = scene.model.triangles;
   const auto count = static_cast<std::int64_t>(triangles.size());
   const std::uint32_t background = pack_rgba(scene.parameters.background);
@@ -40,7 +40,7 @@ void resolve_row(const typename Mode::Key* keys, int width, const Scene& scene, 
                    : shade_flat(triangles[swap_rank(tie, count, rank)], scene.parameters.object);
     }
     colours[x] = colour;
-    depths[x] = Mode::output_depth(key);
+    depths[x] = Mode::output_depth(key, map);
   }
 }
 

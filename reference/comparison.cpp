@@ -16,8 +16,6 @@ using reference::Footprint;
 constexpr double kStep =
     0x1p-24;  // depths are judged in this unit: pictures hold them as floats, most of them near 1
 
-enum class Verdict { kEdgeTie, kDepthTie, kError };
-
 class Judge {
  public:
   Judge(std::span<const Triangle> triangles, const Camera& camera, NearRule near_rule, const ModeBound& bound)
@@ -31,22 +29,22 @@ class Judge {
 
   // Of different ids: `drawn` must be allowed to cover the point with that depth, and `truth` must be allowed
   // to lose the point, by not covering it or by its depth. -1 is the background, at depth 1.
-  Verdict of_different(std::int32_t drawn, double depth, std::int32_t truth, double x, double y) {
+  PixelVerdict of_different(std::int32_t drawn, double depth, std::int32_t truth, double x, double y) {
     bool is_certain = true;  // as far as edges go
     if (drawn >= 0) {
       const Footprint& footprint_drawn = footprint(drawn);
       if (!(depth <= 1) || !footprint_drawn.may_cover(x, y) || !footprint_drawn.depths(x, y).contains(depth))
-        return Verdict::kError;
+        return PixelVerdict::kError;
       is_certain = footprint_drawn.must_cover(x, y);
     } else if (depth != 1) {
-      return Verdict::kError;
+      return PixelVerdict::kError;
     }
     if (truth >= 0) {
       const Footprint& footprint_truth = footprint(truth);
-      if (!footprint_truth.must_cover(x, y)) return Verdict::kEdgeTie;
-      if (!(depth <= footprint_truth.depths(x, y).high)) return Verdict::kError;
+      if (!footprint_truth.must_cover(x, y)) return PixelVerdict::kEdgeTie;
+      if (!(depth <= footprint_truth.depths(x, y).high)) return PixelVerdict::kError;
     }
-    return is_certain ? Verdict::kDepthTie : Verdict::kEdgeTie;
+    return is_certain ? PixelVerdict::kDepthTie : PixelVerdict::kEdgeTie;
   }
 
  private:
@@ -77,12 +75,13 @@ Comparison compare_with_double(const IdImage& truth, std::span<const std::int32_
     throw Error("pictures of different sizes are compared");
   Comparison result;
   result.pixels = static_cast<std::int64_t>(pixels);
+  result.verdicts.assign(pixels, PixelVerdict::kIdentical);
   Judge judge(triangles, camera, near_rule, bound);
   for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
     const double x = static_cast<double>(pixel % width) + 0.5, y = static_cast<double>(pixel / width) + 0.5;
     const std::int32_t drawn = ids[pixel], expected = truth.ids[pixel];
     const double depth = double{depths[pixel]}, exact = truth.depths[pixel];
-    Verdict verdict = Verdict::kError;
+    PixelVerdict verdict = PixelVerdict::kError;
     if (drawn == expected) {
       const double error = std::abs(depth - exact);
       // NaN keeps the old maximum; it is an error anyway.
@@ -95,9 +94,10 @@ Comparison compare_with_double(const IdImage& truth, std::span<const std::int32_
     } else if (drawn >= -1 && drawn < static_cast<std::int64_t>(triangles.size())) {
       verdict = judge.of_different(drawn, depth, expected, x, y);
     }
-    if (verdict == Verdict::kEdgeTie) ++result.edge_ties;
-    if (verdict == Verdict::kDepthTie) ++result.depth_ties;
-    if (verdict == Verdict::kError && result.errors++ == 0)
+    result.verdicts[pixel] = verdict;
+    if (verdict == PixelVerdict::kEdgeTie) ++result.edge_ties;
+    if (verdict == PixelVerdict::kDepthTie) ++result.depth_ties;
+    if (verdict == PixelVerdict::kError && result.errors++ == 0)
       result.worst_pixel = static_cast<std::int64_t>(pixel);
   }
   return result;

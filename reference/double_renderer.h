@@ -30,6 +30,9 @@ struct IdImage {
 IdImage render_in_double(std::span<const Triangle> triangles, const Camera& camera, FillRule fill,
                          NearRule near_rule);
 
+/// What explains a pixel of a comparison.
+enum class PixelVerdict : std::uint8_t { kIdentical, kEdgeTie, kDepthTie, kError };
+
 /// How a picture differs from the double renderer's. Every pixel is in exactly one of the classes identical
 /// (unless its depth is out of bound), edge_ties, depth_ties and errors.
 struct Comparison {
@@ -38,8 +41,9 @@ struct Comparison {
   std::int64_t edge_ties = 0;   ///< ids differ; a centre within the mode's bound of an edge explains it
   std::int64_t depth_ties = 0;  ///< ids differ; a depth gap within the mode's bound explains it
   std::int64_t errors = 0;      ///< ids differ and nothing explains it, or the depth of an equal id is wrong
-  double max_depth_error_steps = 0;  ///< over pixels of equal id, in steps of 2^-24
-  std::int64_t worst_pixel = -1;     ///< index of the first error, or -1
+  double max_depth_error_steps = 0;    ///< over pixels of equal id, in steps of 2^-24
+  std::int64_t worst_pixel = -1;       ///< index of the first error, or -1
+  std::vector<PixelVerdict> verdicts;  ///< per pixel
   bool within_bound() const { return errors == 0; }
 };
 

@@ -40,6 +40,7 @@ struct RayComparison {
   double edge_bound = 0;            ///< pixels; the largest used
   double max_depth_difference = 0;  ///< of d, over pixels of equal id
   std::int64_t worst_pixel = -1;    ///< the first error, or -1
+  std::vector<PixelVerdict> verdicts;  ///< per pixel
 };
 
 /// Classifies where `ids` (drawn by a mode whose vertices have unit roundoff and snap as in `bound`) and

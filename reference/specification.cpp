@@ -29,9 +29,10 @@ Picture render_mode(const Scene& scene, const FrameSettings& settings) {
   using Real = typename Mode::Real;
   const auto& triangles = scene.model.triangles;
   Picture picture{.width = settings.width, .height = settings.height};
-  checked_bytes(settings.pixels(), sizeof(typename Mode::Key) + 12, "the specification's picture");
+  checked_bytes(settings.pixels(), sizeof(typename Mode::Key) + 20, "the specification's picture");
   std::vector<ScreenTriangle<Real>> screen(triangles.size()), extra;
-  transform_triangles<Real>(triangles, 0, make_screen_transform(sized_camera(scene, settings)),
+  const Camera camera = sized_camera(scene, settings);
+  transform_triangles<Real>(triangles, 0, make_screen_transform(camera, Mode::kDepthFunction),
                             settings.geometry, screen.data(), extra, picture.counts);
   screen.insert(screen.end(), extra.begin(), extra.end());
 
@@ -41,7 +42,7 @@ Picture render_mode(const Scene& scene, const FrameSettings& settings) {
   for (const ScreenTriangle<Real>& triangle : screen) {
     if (triangle.id < 0) continue;
     const auto prepared = Mode::prepare(
-        triangle, settings.fill, swap_rank(settings.tie, count, static_cast<std::uint32_t>(triangle.id)));
+        triangle, settings.grid(), swap_rank(settings.tie, count, static_cast<std::uint32_t>(triangle.id)));
     const PixelBox tested = intersect(prepared.box, settings.bounds());
     if (!tested.empty())
       picture.samples_tested += std::int64_t{tested.x1 - tested.x0} * (tested.y1 - tested.y0);
@@ -59,12 +60,15 @@ Picture render_mode(const Scene& scene, const FrameSettings& settings) {
   picture.ids.reserve(keys.size());
   picture.depths.reserve(keys.size());
   picture.colours.reserve(keys.size());
+  picture.values.reserve(keys.size());
+  const DepthMap map = depth_map(camera, Mode::kDepthFunction);
   const std::uint32_t background = pack_rgba(scene.parameters.background);
   for (const auto& key : keys) {
     const bool drawn = key < Mode::kClear;
     const auto id = drawn ? static_cast<std::int32_t>(swap_rank(settings.tie, count, Mode::rank(key))) : -1;
     picture.ids.push_back(id);
-    picture.depths.push_back(Mode::output_depth(key));
+    picture.depths.push_back(Mode::output_depth(key, map));
+    picture.values.push_back(Mode::value(key));
     picture.colours.push_back(
         drawn ? shade_flat(triangles[static_cast<std::size_t>(id)], scene.parameters.object) : background);
   }
@@ -74,16 +78,11 @@ Picture render_mode(const Scene& scene, const FrameSettings& settings) {
 }  // namespace
 
 Picture render_specification(const Scene& scene, std::string_view mode, const FrameSettings& settings) {
+  available_mode(mode, "numeric");
   Picture picture;
-  std::vector<std::string> known;
-  bool found = false;
   for_each_mode([&]<NumericMode Mode>() {
-    known.emplace_back(Mode::kInfo.name);
-    if (Mode::kInfo.name != mode) return;
-    found = true;
-    picture = render_mode<Mode>(scene, settings);
+    if (Mode::kInfo.name == mode) picture = render_mode<Mode>(scene, settings);
   });
-  if (!found) throw InputError({.field = "numeric"}, unknown_name("numeric mode", mode, known));
   return picture;
 }
 
@@ -104,7 +103,8 @@ Picture picture_of(const Renderer& renderer, const FrameSettings& settings) {
           .height = settings.height,
           .ids = renderer.ids(),
           .depths = {depths.begin(), depths.end()},
-          .colours = {colours.begin(), colours.end()}};
+          .colours = {colours.begin(), colours.end()},
+          .values = renderer.values()};
 }
 
 }  // namespace rasterbench

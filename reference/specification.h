@@ -17,6 +17,7 @@ struct Picture {
   std::vector<std::int32_t> ids = {};       ///< -1 = background
   std::vector<float> depths = {};           ///< 1 = background
   std::vector<std::uint32_t> colours = {};  ///< RGBA8
+  std::vector<double> values = {};          ///< depth values as stored, Renderer::values()
   GeometryCounts counts = {};
   std::int64_t samples_tested = 0;   ///< in the boxes of all screen triangles, cut to the image
   std::int64_t samples_covered = 0;  ///< of those, inside: pixels times depth complexity

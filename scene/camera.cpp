@@ -49,6 +49,11 @@ Camera look_at_origin(const Vec3d& position, double theta, double near_plane, do
   camera.near_distance = scaled(view.w, -1, view.distance - near_plane);
   camera.viewport = viewport;
   camera.near_w = near_plane;
+  // r = n (f - distance) / ((f - n) distance), and the row is -r w.
+  const double reversed_scale = near_plane / (far_plane - near_plane);
+  camera.reversed_z = scaled(view.w, -reversed_scale, -reversed_scale * (far_plane - view.distance));
+  camera.near_plane = near_plane;
+  camera.far_plane = far_plane;
   return camera;
 }
 
@@ -67,6 +72,11 @@ Camera orthographic_at_origin(const Vec3d& position, double half_height, double 
   camera.near_distance = scaled(view.w, -1, view.distance - near_plane);
   camera.viewport = viewport;
   camera.near_w = 1;
+  const double reversed_scale = 1 / (far_plane - near_plane);
+  camera.reversed_z = scaled(view.w, -reversed_scale, -reversed_scale * (far_plane - view.distance));
+  camera.near_plane = near_plane;
+  camera.far_plane = far_plane;
+  camera.perspective = false;
   return camera;
 }
 

@@ -41,6 +41,10 @@ struct Camera {
   AffineRow near_distance;
   Viewport viewport;
   double near_w = 0;  ///< w of every point on the near plane, where it is the same for all; 0 where it is not
+  AffineRow reversed_z = {};  ///< over w: minus reversed z, -1 on the near and 0 on the far plane, kept apart
+                              ///< because z - w loses it to rounding
+  double near_plane = 0, far_plane = 0;  ///< distances from the camera along the view axis, world units
+  bool perspective = true;               ///< false: orthographic, w is 1 everywhere
 };
 
 /// The camera of the course contract (INFO0939): at `position`, looking at the origin, y up, perspective.

@@ -1,11 +1,10 @@
 // fixed_8: snapping, and the symmetries and exactness that integers give.
-#include "numeric/fixed_8.h"
-
 #include <gtest/gtest.h>
 
 #include <bit>
 
 #include "numeric/coverage_testing.h"
+#include "numeric/fixed_8.h"
 #include "scene/generator.h"
 
 namespace rasterbench {
