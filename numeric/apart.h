@@ -32,6 +32,7 @@ struct Corners {
 #define RASTERBENCH_APART_FUNCTIONS                                                                \
   bool setup(Form form, const Corners& corners, bool closed, int width, int height, Setup& setup); \
   bool inside_edge(Form form, const Setup& setup, int e, std::int32_t x, std::int32_t y);          \
+  float edge_value(Form form, const Setup& setup, int e, std::int32_t x, std::int32_t y);          \
   std::uint64_t inside_run(Form form, const Setup& setup, std::int32_t x, std::int32_t y, int n);  \
   void depth_run(Form form, const Setup& setup, std::int32_t x, std::int32_t y, int n, float* depths);
 

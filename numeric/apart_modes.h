@@ -34,6 +34,9 @@ struct ApartMode : PackedKeys {
   static bool inside(const Prepared& p, std::int32_t x, std::int32_t y) {
     return inside_run(p, x, y, 1) != 0;
   }
+  static float edge_value(const Prepared& p, int e, std::int32_t x, std::int32_t y) {
+    return Variant::edge_value(kForm, p, e, x, y);
+  }
   static float depth(const Prepared& p, std::int32_t x, std::int32_t y) {
     float depth;
     depth_run(p, x, y, 1, &depth);
@@ -50,12 +53,14 @@ struct ApartMode : PackedKeys {
 struct FmaVariant {
   static constexpr auto setup = apart::fma::setup;
   static constexpr auto inside_edge = apart::fma::inside_edge;
+  static constexpr auto edge_value = apart::fma::edge_value;
   static constexpr auto inside_run = apart::fma::inside_run;
   static constexpr auto depth_run = apart::fma::depth_run;
 };
 struct FastmathVariant {
   static constexpr auto setup = apart::fastmath::setup;
   static constexpr auto inside_edge = apart::fastmath::inside_edge;
+  static constexpr auto edge_value = apart::fastmath::edge_value;
   static constexpr auto inside_run = apart::fastmath::inside_run;
   static constexpr auto depth_run = apart::fastmath::depth_run;
 };

@@ -39,6 +39,10 @@ struct Exact : ExactKeys {
     return inside_edge(p, 0, x, y) && inside_edge(p, 1, x, y) && inside_edge(p, 2, x, y);
   }
 
+  static float edge_value(const Prepared& p, int e, std::int32_t x, std::int32_t y) {
+    return FilteredEdges::value(p, e, x, y);
+  }
+
   static ExactDepth depth(const Prepared& p, std::int32_t x, std::int32_t y) {
     return {Plane::at(p.plane, x, y), p.error, x, y, p.triangle};
   }

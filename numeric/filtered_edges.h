@@ -56,13 +56,17 @@ struct FilteredEdges {
     return true;
   }
 
-  static bool inside_edge(const Setup& s, int e, std::int32_t x, std::int32_t y) {
+  static float value(const Setup& s, int e, std::int32_t x, std::int32_t y) {
     const float sx = static_cast<float>(x) + 0.5f;
     const float sy = static_cast<float>(y) + 0.5f;
-    const float value = s.dx[e] * (sy - s.ay[e]) - s.dy[e] * (sx - s.ax[e]);
-    if (value > s.error[e]) return true;
-    if (value < -s.error[e]) return false;
-    return exactly_inside_edge(s, e, sx, sy);
+    return s.dx[e] * (sy - s.ay[e]) - s.dy[e] * (sx - s.ax[e]);
+  }
+
+  static bool inside_edge(const Setup& s, int e, std::int32_t x, std::int32_t y) {
+    const float filter = value(s, e, x, y);
+    if (filter > s.error[e]) return true;
+    if (filter < -s.error[e]) return false;
+    return exactly_inside_edge(s, e, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
   }
 
  private:

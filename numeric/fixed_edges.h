@@ -55,10 +55,18 @@ struct FixedEdges {
     return true;
   }
 
-  static bool inside_edge(const Setup& s, int e, std::int32_t x, std::int32_t y) {
+  /// In 1 / kOne^2 px^2.
+  static std::int64_t grid_value(const Setup& s, int e, std::int32_t x, std::int32_t y) {
     const std::int64_t sx = x * kOne + kHalf;
     const std::int64_t sy = y * kOne + kHalf;
-    return s.dx[e] * (sy - s.ay[e]) - s.dy[e] * (sx - s.ax[e]) >= s.least[e];
+    return s.dx[e] * (sy - s.ay[e]) - s.dy[e] * (sx - s.ax[e]);
+  }
+  static double value(const Setup& s, int e, std::int32_t x, std::int32_t y) {
+    return static_cast<double>(grid_value(s, e, x, y)) / (double{kOne} * kOne);
+  }
+
+  static bool inside_edge(const Setup& s, int e, std::int32_t x, std::int32_t y) {
+    return grid_value(s, e, x, y) >= s.least[e];
   }
 };
 

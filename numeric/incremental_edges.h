@@ -17,15 +17,19 @@ struct IncrementalEdges : CrossEdges<float> {
   static void walk(const Setup& s, int e, std::int32_t first, std::int32_t last, std::int32_t y,
                    Visit visit) {
     const std::int32_t start = first & ~(kRestart - 1);
-    float sum = value(s, e, start, y);
+    float sum = CrossEdges<float>::value(s, e, start, y);
     for (std::int32_t x = start; x < first; ++x) sum -= s.dy[e];
     for (std::int32_t x = first; x <= last; ++x, sum -= s.dy[e]) visit(x, sum);
   }
 
+  static float value(const Setup& s, int e, std::int32_t x, std::int32_t y) {
+    float value = 0;
+    walk(s, e, x, x, y, [&](std::int32_t, float sum) { value = sum; });
+    return value;
+  }
+
   static bool inside_edge(const Setup& s, int e, std::int32_t x, std::int32_t y) {
-    bool inside = false;
-    walk(s, e, x, x, y, [&](std::int32_t, float sum) { inside = sum >= s.least[e]; });
-    return inside;
+    return value(s, e, x, y) >= s.least[e];
   }
 
   static std::uint64_t inside_run(const Setup& s, std::int32_t x, std::int32_t y, std::int32_t n) {

@@ -11,6 +11,7 @@
 //   M::kMonotone  whether the pixels of a row that pass an edge test form one half-line, so that spans can be
 //                 searched
 //   M::inside(prepared, x, y)   all three edge tests; covers(prepared, x, y) is inside() within the box
+//   M::edge_value(prepared, e, x, y)   the number that the test of edge e looks at, for explanations
 //   M::depth(prepared, x, y)    depth at the sample; always within the depths of the corners
 //   M::Key, M::key(depth, rank) keys order fragments: the smallest key owns a pixel
 //   M::kClear     key of an empty pixel: every fragment nearer than the far plane is smaller
@@ -151,6 +152,7 @@ concept NumericMode = requires(const ScreenTriangle<typename Mode::Real>& triang
     } -> std::same_as<typename Mode::Prepared>;
   { Mode::inside_edge(prepared, 0, 0, 0) } -> std::same_as<bool>;
   { Mode::inside(prepared, 0, 0) } -> std::same_as<bool>;
+  { Mode::edge_value(prepared, 0, 0, 0) } -> std::convertible_to<double>;
   { Mode::key(Mode::depth(prepared, 0, 0), std::uint32_t{}) } -> std::same_as<typename Mode::Key>;
   { Mode::output_depth(key, DepthMap{}) } -> std::same_as<float>;
   { Mode::value(key) } -> std::same_as<double>;
@@ -230,7 +232,7 @@ PixelBox sample_box(const ScreenTriangle<Real>& t) {
 }
 
 /// A mode of an edge arithmetic and a depth arithmetic. Edges has Real, Setup, kMonotone, corners() (the
-/// canonical and, for fixed point, snapped triangle), setup() (false: draws nothing), box() and
+/// canonical and, for fixed point, snapped triangle), setup() (false: draws nothing), value() and
 /// inside_edge(); Depth is as in depth.h.
 template <class Edges, class Depth>
 struct Combined : Depth::Keys {
@@ -259,6 +261,10 @@ struct Combined : Depth::Keys {
 
   static bool inside(const Prepared& p, std::int32_t x, std::int32_t y) {
     return inside_edge(p, 0, x, y) && inside_edge(p, 1, x, y) && inside_edge(p, 2, x, y);
+  }
+
+  static auto edge_value(const Prepared& p, int e, std::int32_t x, std::int32_t y) {
+    return Edges::value(p, e, x, y);
   }
 
   static auto depth(const Prepared& p, std::int32_t x, std::int32_t y) { return Depth::at(p.plane, x, y); }

@@ -29,10 +29,14 @@ struct PlaneEdges {
     return true;
   }
 
-  static bool inside_edge(const Setup& s, int e, std::int32_t x, std::int32_t y) {
+  static float value(const Setup& s, int e, std::int32_t x, std::int32_t y) {
     const float sx = static_cast<float>(x) + 0.5f;
     const float sy = static_cast<float>(y) + 0.5f;
-    return (s.dx[e] * sy - s.dy[e] * sx) + s.c[e] >= s.least[e];
+    return (s.dx[e] * sy - s.dy[e] * sx) + s.c[e];
+  }
+
+  static bool inside_edge(const Setup& s, int e, std::int32_t x, std::int32_t y) {
+    return value(s, e, x, y) >= s.least[e];
   }
 };
 
