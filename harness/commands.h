@@ -19,6 +19,7 @@ void add_render_command(CLI::App& app);
 void add_study_command(CLI::App& app, Outcome& outcome, const std::vector<std::string>& benchmark_flags);
 void add_list_command(CLI::App& app);
 void add_scene_command(CLI::App& app);
+void add_verify_command(CLI::App& app, Outcome& outcome);
 void add_runner_command(CLI::App& app, Outcome& outcome, const std::vector<std::string>& benchmark_flags);
 
 /// How one picture is drawn, as options of a command.

@@ -30,12 +30,25 @@ Json list_kernels() {
 
 Json list_numerics() {
   Json list = Json::array();
-  for (const ModeInfo& info : mode_infos())
-    list.push_back({{"name", info.name},
-                    {"vertices", info.vertices},
-                    {"edges", info.edges},
-                    {"depth", info.depth},
-                    {"bound", info.bound}});
+  for (const ModeInfo& info : mode_infos()) {
+    Json carried_by = Json::array();
+    for (const Kernel& kernel : kernels())
+      if (!kernel.info().hidden && kernel.variant(info.name).make) carried_by.push_back(kernel.info().name);
+    Json entry{{"name", info.name},
+               {"vertices", info.vertices},
+               {"edges", info.edges},
+               {"depth", info.depth},
+               {"bound", info.bound},
+               {"bound_source", info.bound_source},
+               {"bounded", info.numbers.bounded},
+               {"same_bits_on", info.same_on_every_cpu
+                                    ? "any threads, tiles, order and CPU"
+                                    : "any threads, tiles and order, on one type of CPU and compiler"},
+               {"kernels", carried_by},
+               {"available", info.unavailable.empty()}};
+    if (!info.unavailable.empty()) entry["reason"] = info.unavailable;
+    list.push_back(std::move(entry));
+  }
   return list;
 }
 

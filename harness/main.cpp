@@ -33,6 +33,7 @@ int run(int argc, char** argv) {
   Outcome outcome;
   add_render_command(app);
   add_study_command(app, outcome, benchmark_flags);
+  add_verify_command(app, outcome);
   add_list_command(app);
   add_scene_command(app);
   add_runner_command(app, outcome, benchmark_flags);

@@ -16,9 +16,9 @@ constexpr int kDetailWidth = 60;
 
 Progress::Progress() : terminal_(isatty(STDERR_FILENO) == 1) {}
 
-Progress::~Progress() { clear_bar(); }
+Progress::~Progress() { clear(); }
 
-void Progress::clear_bar() {
+void Progress::clear() {
   if (bar_shown_) fmt::print(stderr, "\r\033[K");
   bar_shown_ = false;
 }
@@ -43,7 +43,7 @@ void Progress::show(const std::string& phase, double done, double total, const s
 }
 
 void Progress::note(const std::string& line) {
-  clear_bar();
+  clear();
   fmt::print(stderr, "{}\n", line);
 }
 

@@ -17,9 +17,10 @@ class Progress {
   /// Prints a line of its own above the bar.
   void note(const std::string& line);
 
- private:
-  void clear_bar();
+  /// Takes the bar away, so that a line on stdout does not run into it.
+  void clear();
 
+ private:
   bool terminal_;
   bool bar_shown_ = false;
   std::string phase_;

@@ -1,11 +1,13 @@
-// The two checks that every point passes before it is timed: it equals the scalar specification of its mode
-// bit for bit, and the independent double renderer's picture within the mode's bound.
+// The checks that every point passes before it is timed: it equals the scalar specification of its mode bit
+// for bit, and nothing contradicts the mode's bound: not the exact oracle, not the end-to-end truth.
 #pragma once
 
+#include <deque>
 #include <memory>
+#include <string>
 
 #include "harness/point.h"
-#include "reference/double_renderer.h"
+#include "reference/judge.h"
 #include "reference/specification.h"
 
 namespace rasterbench {
@@ -13,24 +15,26 @@ namespace rasterbench {
 /// The hash of what `renderer` drew last, colours and depths: ties a timed frame to the verified one.
 std::string picture_hash(const Renderer& renderer);
 
-/// Judges points. Keeps the expected pictures of the last (scene, size, mode, fill, near), which points are
-/// sorted by.
+/// Judges points. Keeps what the last ones were compared with: points are sorted by it.
 class Verifier {
  public:
   /// {"verify": as in records.md, "work": as in records.md, "frame_ms": one frame, "threads_observed": n,
   /// "failure": text or null}. Draws with the point's own kernel and execution: once as it is timed, once
-  /// with the screen triangles permuted.
+  /// with the screen triangles permuted. The verdicts on accuracy are those on the specification's picture,
+  /// which a point that conforms has drawn to the bit.
   Json judge(const Point& point, const Scene& scene);
 
  private:
   struct Expected {
     std::string key;
     Picture specification;
-    IdImage truth;
+    Json verdicts;
   };
   const Expected& expected(const Point& point, const Scene& scene);
+  Judge& judge_of(const Point& point, const Scene& scene);
 
   Expected expected_;
+  std::deque<std::pair<std::string, std::unique_ptr<Judge>>> judges_;  // the last few; the newest in front
 };
 
 }  // namespace rasterbench

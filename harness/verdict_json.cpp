@@ -1,0 +1,118 @@
+#include "harness/verdict_json.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "base/error.h"
+
+namespace rasterbench {
+namespace {
+
+/// JSON has no infinities: what has no finite value is null.
+Json finite(double value) { return std::isfinite(value) ? Json(value) : Json(); }
+
+Json oracle_json(const Accuracy& a, const OracleEffort& effort) {
+  Json json;
+  json["renderer"] = "exact arithmetic on the mode's own screen vertices";
+  json["pixels"] = a.pixels;
+  json["wrong"] = a.wrong;
+  json["false_positives"] = a.false_positives;
+  json["false_negatives"] = a.false_negatives;
+  json["exact_ties"] = a.exact_ties;
+  json["edge"] = a.edge;
+  json["depth"] = a.depth;
+  json["unexplained"] = a.unexplained;
+  json["unbounded"] = a.unbounded;
+  json["predicted"] = a.predicted;
+  json["worst_distance_px"] = finite(a.worst_distance);
+  json["max_depth_error_steps"] = finite(a.max_depth_error_steps);
+  json["max_depth_error_world"] = finite(a.max_depth_error_world);
+  json["silhouette_hausdorff_px"] = finite(a.silhouette_hausdorff);
+  json["colours_changed"] = a.colours_changed;
+  json["colours_changed_8"] = a.colours_changed_8;
+  json["psnr_db"] = finite(a.psnr);
+  json["within_bound"] = a.within_bound();
+  json["coverage_fallbacks"] = effort.coverage_fallbacks;
+  json["depth_fallbacks"] = effort.depth_fallbacks;
+  json["seconds"] = effort.seconds;
+  return json;
+}
+
+Json end_to_end_json(const EndToEndVerdict& v, const EndToEndTruth& truth) {
+  Json json;
+  json["renderer"] = "intervals from the file's values: double, then multiprecision";
+  json["pixels"] = v.pixels;
+  json["identical"] = v.identical;
+  json["wrong"] = v.wrong();
+  json["ambiguous"] = v.ambiguous;
+  json["edge_ties"] = v.edge_ties;
+  json["depth_ties"] = v.depth_ties;
+  json["unbounded"] = v.unbounded;
+  json["errors"] = v.errors;
+  json["max_depth_error_steps"] = finite(v.max_depth_error_steps);
+  json["multiprecision_pixels"] = truth.by_multiprecision;
+  json["seconds"] = truth.seconds;
+  return json;
+}
+
+Json rays_json(const RayComparison& c, const RayCastPicture& rays, bool robust) {
+  Json json;
+  json["version"] = embree_version();
+  json["robust"] = robust;
+  json["identical"] = c.identical;
+  json["edge_ties"] = c.edge_ties;
+  json["depth_ties"] = c.depth_ties;
+  json["errors"] = c.errors;
+  json["max_depth_difference"] = finite(c.max_depth_difference);
+  json["build_ms"] = rays.build_seconds * 1e3;
+  json["trace_ms"] = rays.trace_seconds * 1e3;
+  return json;
+}
+
+std::string place(std::int64_t pixel, int width) {
+  return fmt::format("x={} y={}", pixel % width, pixel / width);
+}
+
+}  // namespace
+
+Json judge_picture(Judge& judge, const Picture& picture, const ModeInfo& mode) {
+  const FrameSettings& settings = judge.settings();
+  Json json;
+  std::string failure;
+
+  Accuracy accuracy;
+  if (mode.has_screen_triangles) {
+    accuracy = judge.against_oracle(picture, mode);
+    json["oracle"] = oracle_json(accuracy, judge.oracle(mode).effort);
+    if (mode.numbers.snap > 0) {
+      const Accuracy snapped = judge.against_snapped_oracle(picture, mode);
+      json["oracle"]["wrong_on_snapped"] = snapped.wrong;
+      json["oracle"]["edge_on_snapped"] = snapped.false_positives + snapped.false_negatives + snapped.edge;
+    }
+    if (!accuracy.within_bound())
+      failure = fmt::format("{} pixels differ from the exact oracle beyond the bound of {}, the worst at {}",
+                            accuracy.unexplained, mode.name, place(accuracy.worst_pixel, settings.width));
+  } else {
+    json["oracle"] = nullptr;
+  }
+
+  const EndToEndVerdict end_to_end =
+      judge.against_truth(picture, mode, mode.has_screen_triangles ? &accuracy : nullptr);
+  json["end_to_end"] = end_to_end_json(end_to_end, judge.truth());
+  if (failure.empty() && end_to_end.errors > 0)
+    failure =
+        fmt::format("{} pixels differ from the end-to-end truth and nothing explains it, the first at {}",
+                    end_to_end.errors, place(end_to_end.worst_pixel, settings.width));
+
+  if (has_embree()) {
+    json["embree"] = rays_json(judge.against_rays(picture, mode), judge.rays(false), false);
+  } else {
+    json["embree"] = {{"skipped", embree_version()}};
+  }
+  json["bound"] = {{"bounded", mode.numbers.bounded}, {"text", mode.bound}, {"source", mode.bound_source}};
+  json["failure"] = failure.empty() ? Json() : Json(failure);
+  return json;
+}
+
+}  // namespace rasterbench

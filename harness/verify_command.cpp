@@ -1,0 +1,237 @@
+#include <fmt/format.h>
+
+#include <charconv>
+#include <memory>
+
+#include "base/error.h"
+#include "harness/commands.h"
+#include "harness/explain.h"
+#include "harness/progress.h"
+#include "harness/verdict_json.h"
+#include "kernels/kernel.h"
+#include "scene/image.h"
+
+namespace rasterbench {
+namespace {
+
+struct VerifyOptions {
+  std::string model, scene_file;
+  std::vector<std::string> kernels, numerics;
+  std::string size, fill = "closed", near_rule = "clip";
+  int threads = 0;
+  std::string difference, explain;
+  bool json = false;
+};
+
+/// What is verified where no MODEL is given: one scene of each kind of load, small enough to take seconds.
+constexpr const char* kBuiltInScenes[] = {"teapot:triangles=43000", "terrain:triangles=20000",
+                                          "confetti:triangles=20000,size=16,distribution=heavy",
+                                          "layers:triangles=2000,depth=4"};
+
+std::pair<int, int> parse_pixel(const std::string& text, int width, int height) {
+  int x = -1, y = -1;
+  const std::size_t comma = text.find(',');
+  const auto number = [](std::string_view part, int& value) {
+    const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), value);
+    return error == std::errc() && end == part.data() + part.size();
+  };
+  if (comma == std::string::npos || !number(std::string_view(text).substr(0, comma), x) ||
+      !number(std::string_view(text).substr(comma + 1), y))
+    throw InputError({.field = "--explain"}, fmt::format("'{}' is not X,Y", text));
+  if (x < 0 || x >= width || y < 0 || y >= height)
+    throw InputError({.field = "--explain"},
+                     fmt::format("pixel {},{} is not in an image of {}x{}", x, y, width, height));
+  return {x, y};
+}
+
+std::string count_or_dash(const Json& value) { return value.is_null() ? "-" : value.dump(); }
+
+std::string number_or_dash(const Json& value) {
+  return value.is_null() ? "-" : fmt::format("{:.3g}", value.get<double>());
+}
+
+constexpr const char* kRow =
+    "{:<23} {:<17} {:<8} {:>8} {:>7} {:>7} {:>6} {:>8} {:>9} {:>10} {:>10} {:>9} {:>7} {:>9} {:>7}  {}\n";
+
+void print_head() {
+  fmt::print(fmt::runtime(kRow), "", "", "", "exact", "", "", "", "beyond", "can be", "worst", "depth",
+             "of truth", "", "of rays", "", "");
+  fmt::print(fmt::runtime(kRow), "numeric", "kernel", "conforms", "wrong", "edge", "depth", "tie", "bound",
+             "wrong", "px", "steps", "wrong", "errors", "ties", "errors", "verdict");
+}
+
+void print_row(const Json& row) {
+  const Json& verify = row.at("verify");
+  const Json none;
+  const auto of = [&](const char* judge, const char* key) -> Json {
+    const Json& verdict = verify.at(judge);
+    return verdict.is_null() || !verdict.contains(key) ? none : verdict.at(key);
+  };
+  const Json predicted = of("oracle", "predicted");
+  const Json ray_ties = of("embree", "edge_ties").is_null()
+                            ? none
+                            : Json(of("embree", "edge_ties").get<std::int64_t>() +
+                                   of("embree", "depth_ties").get<std::int64_t>());
+  const bool bounded = verify.at("bound").at("bounded").get<bool>();
+  fmt::print(fmt::runtime(kRow), row.at("numeric").get<std::string>(), row.at("kernel").get<std::string>(),
+             verify.at("conforms").get<bool>() ? "yes" : "NO", count_or_dash(of("oracle", "wrong")),
+             count_or_dash(of("oracle", "edge")), count_or_dash(of("oracle", "depth")),
+             count_or_dash(of("oracle", "exact_ties")), count_or_dash(of("oracle", "unexplained")),
+             predicted == Json(-1) ? "any" : count_or_dash(predicted),
+             number_or_dash(of("oracle", "worst_distance_px")),
+             number_or_dash(of("oracle", "max_depth_error_steps")), count_or_dash(of("end_to_end", "wrong")),
+             count_or_dash(of("end_to_end", "errors")), count_or_dash(ray_ties),
+             count_or_dash(of("embree", "errors")),
+             !row.at("failure").is_null()       ? "FAILED"
+             : !bounded                         ? "unbounded"
+             : of("oracle", "wrong") == Json(0) ? "exact"
+                                                : "within bound");
+}
+
+/// One kernel in one mode: draws, compares with the specification, adds the verdicts on the mode.
+Json verify_row(const std::string& kernel, const Picture& specification, const Json& verdicts,
+                const RendererSetup& setup, const ModeInfo& mode) {
+  const auto renderer = make_renderer(kernel, mode.name, setup);
+  renderer->draw();
+  const std::int64_t differing = differing_pixels(picture_of(*renderer, setup.settings), specification);
+  Json row{{"numeric", mode.name}, {"kernel", kernel}};
+  Json& verify = row["verify"];
+  verify["conforms"] = differing == 0;
+  verify["differing_pixels"] = differing;
+  for (const char* verdict : {"oracle", "end_to_end", "embree", "bound"})
+    verify[verdict] = verdicts.at(verdict);
+  row["failure"] =
+      differing == 0
+          ? verdicts.at("failure")
+          : Json(fmt::format("{} pixels differ from the specification of {}", differing, mode.name));
+  return row;
+}
+
+/// Verifies one scene; returns the number of rows that failed.
+int verify_scene(const VerifyOptions& options, const std::string& model, Json& rows) {
+  const Scene scene = open_scene(model, options.scene_file);
+  FrameSettings settings;
+  settings.width = scene.parameters.width;
+  settings.height = scene.parameters.height;
+  if (!options.size.empty()) std::tie(settings.width, settings.height) = parse_size(options.size, "--size");
+  settings.fill = parse_fill(options.fill, "--fill");
+  settings.geometry.near_rule = parse_near(options.near_rule, "--near");
+  std::pair<int, int> pixel{-1, -1};
+  if (!options.explain.empty()) pixel = parse_pixel(options.explain, settings.width, settings.height);
+
+  DrawOptions draw;
+  draw.threads = options.threads;
+  const ExecutionConfig execution = execution_of(draw);
+  Judge judge(scene, settings, execution.threads);
+  if (!options.explain.empty()) {
+    fmt::print("{}", explain_pixel(judge, options.numerics, pixel.first, pixel.second));
+    return 0;
+  }
+
+  if (!options.json) {
+    fmt::print("{}{} at {}x{}, {}\n", rows.empty() ? "" : "\n", model, settings.width, settings.height,
+               options.fill);
+    print_head();
+  }
+  Progress progress;
+  std::vector<std::pair<std::string, std::string>> failures;
+  std::size_t done = 0;
+  for (const std::string& name : options.numerics) {
+    const ModeInfo& mode = available_mode(name, "--numeric");
+    std::vector<std::string> kernels;
+    for (const std::string& kernel : options.kernels)
+      if (find_kernel(kernel).variant(name).make) kernels.push_back(kernel);
+    ++done;
+    if (kernels.empty()) continue;
+    progress.show("verifying", static_cast<double>(done), static_cast<double>(options.numerics.size()), name);
+    const Picture specification = render_specification(scene, name, settings);
+    const Json verdicts = judge_picture(judge, specification, mode);
+    for (const std::string& kernel : kernels) {
+      Json row = verify_row(kernel, specification, verdicts, {&scene, settings, execution}, mode);
+      row["model"] = model;
+      row["size"] = {settings.width, settings.height};
+      if (!options.json) {
+        progress.clear();
+        print_row(row);
+      }
+      if (!row.at("failure").is_null()) failures.emplace_back(kernel + " " + name, row.at("failure"));
+      rows.push_back(std::move(row));
+    }
+    if (!options.difference.empty()) {
+      const Accuracy accuracy = judge.against_oracle(specification, mode);
+      const DifferenceImage image =
+          difference_image(accuracy, specification.colours, settings.width, settings.height);
+      write_image(options.difference, image.pixels, image.width, image.height);
+    }
+  }
+  progress.clear();
+  if (!options.json) {
+    const EndToEndTruth& truth = judge.truth();
+    fmt::print("end-to-end truth: {} pixels by multiprecision, {} ambiguous, {:.1f} s; Embree {}\n",
+               truth.by_multiprecision, truth.ambiguous, truth.seconds,
+               has_embree()
+                   ? fmt::format("{}: build {:.1f} ms, trace {:.1f} ms", embree_version(),
+                                 judge.rays(false).build_seconds * 1e3, judge.rays(false).trace_seconds * 1e3)
+                   : "skipped: " + embree_version());
+    for (const auto& [point, reason] : failures) fmt::print("FAILED {}: {}\n", point, reason);
+    if (!options.difference.empty()) fmt::print("wrote {}\n", options.difference);
+  }
+  return static_cast<int>(failures.size());
+}
+
+void check_options(VerifyOptions& options) {
+  if (options.kernels.empty()) options.kernels = {"tile_parallel", "ray_cast"};
+  for (const std::string& kernel : options.kernels) find_kernel(kernel);
+  for (const std::string& name : options.numerics) available_mode(name, "--numeric");
+  if (options.numerics.empty())
+    for (const ModeInfo& mode : mode_infos())
+      if (mode.unavailable.empty()) options.numerics.emplace_back(mode.name);
+  if (!options.difference.empty()) {
+    if (options.numerics.size() != 1 || options.model.empty())
+      throw InputError({.field = "--difference"}, "is of one MODEL and one --numeric");
+    check_image_path(options.difference);
+    check_output_path(options.difference);
+    if (!available_mode(options.numerics.front(), "--numeric").has_screen_triangles)
+      throw InputError({.field = "--difference"}, "needs a mode that the exact oracle can judge");
+  }
+  if (!options.explain.empty() && options.model.empty())
+    throw InputError({.field = "--explain"}, "needs a MODEL");
+}
+
+}  // namespace
+
+void add_verify_command(CLI::App& app, Outcome& outcome) {
+  CLI::App* command = app.add_subcommand(
+      "verify", "judge kernels and numeric modes: specification, exact oracle, end-to-end truth, Embree");
+  const auto o = std::make_shared<VerifyOptions>();
+  command->add_option("MODEL", o->model, "a .dat file or a generator (default: four built-in scenes)");
+  command->add_option("SCENE", o->scene_file,
+                      "scene parameter file (default: a camera that shows the model)");
+  command->add_option("--kernel", o->kernels, "strategies (default: tile_parallel and ray_cast)");
+  command->add_option("--numeric", o->numerics, "numeric modes (default: all that this CPU can run)");
+  command->add_option("--size", o->size, "WxH in pixels, each 1 to 65536 (default: the scene's)");
+  command->add_option("--fill", o->fill, "closed or top-left")->capture_default_str();
+  command->add_option("--near", o->near_rule, "clip at the near plane, or off")->capture_default_str();
+  command->add_option("--threads", o->threads, "threads of kernels and judges (default: all CPUs)")
+      ->check(CLI::Range(1, 65536));
+  command->add_option("--difference", o->difference,
+                      "IMAGE.png: where one mode's picture differs from the oracle's, by class");
+  command->add_option("--explain", o->explain,
+                      "X,Y: which triangles claim this pixel, their edges and depths in each arithmetic");
+  command->add_flag("--json", o->json, "an array of rows in place of the table");
+  command->callback([o, &outcome] {
+    check_options(*o);
+    Json rows = Json::array();
+    int failed = 0;
+    if (!o->model.empty()) {
+      failed = verify_scene(*o, o->model, rows);
+    } else {
+      if (o->size.empty()) o->size = "640x360";
+      for (const char* model : kBuiltInScenes) failed += verify_scene(*o, model, rows);
+    }
+    if (o->json && o->explain.empty()) fmt::print("{}\n", dump(rows, 2));
+    if (failed > 0) outcome.exit_code = 1;
+  });
+}
+
+}  // namespace rasterbench
