@@ -131,7 +131,8 @@ class Coordinator {
       if (state.open() && state.judgement.is_null()) unverified.push_back(&state);
     // Grouped by what they are compared with, so that it is drawn once.
     std::stable_sort(unverified.begin(), unverified.end(), [](const PointState* a, const PointState* b) {
-      return comparison_of(a->planned->point) < comparison_of(b->planned->point);
+      const Point &p = a->planned->point, &q = b->planned->point;
+      return std::pair(trade_of(p), comparison_of(p)) < std::pair(trade_of(q), comparison_of(q));
     });
     std::size_t done = 0;
     for (PointState* state : unverified) {
@@ -199,11 +200,11 @@ class Coordinator {
   /// Points to sample in the next block: those that have not stopped, and the bases that these are compared
   /// with.
   std::vector<PointState*> next_block() {
-    std::map<std::string, bool> open_comparison, open_family;
+    std::map<std::string, bool> open_comparison, open_family, open_trade;
     for (const PointState& state : states_)
       if (state.open())
         open_comparison[comparison_of(state.planned->point)] = open_family[family_of(state.planned->point)] =
-            true;
+            open_trade[trade_of(state.planned->point)] = true;
     const auto fastest = fastest_serial();
     std::vector<PointState*> block;
     for (PointState& state : states_) {
@@ -212,7 +213,8 @@ class Coordinator {
       const auto base = fastest.find(comparison_of(point));
       const bool is_base =
           (base != fastest.end() && base->second == &state && open_comparison[comparison_of(point)]) ||
-          (point.execution.threads == 1 && open_family[family_of(point)]);
+          (point.execution.threads == 1 && open_family[family_of(point)]) ||
+          (is_literal_program(point) && open_trade[trade_of(point)]);
       if (state.open() || is_base) block.push_back(&state);
     }
     return block;

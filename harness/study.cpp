@@ -62,6 +62,17 @@ std::string comparison_of(const Point& point) {
   return point_name(common);
 }
 
+std::string trade_of(const Point& point) {
+  Point common = point;
+  common.numeric = "any";
+  return comparison_of(common);
+}
+
+bool is_literal_program(const Point& point) {
+  return point.numeric == "two_product" && point.execution.backend == "serial" &&
+         (point.kernel == "bounding_box" || point.kernel == "all_pixels");
+}
+
 std::string family_of(const Point& point) {
   Point family = point;
   family.execution.threads = 0;
@@ -73,8 +84,8 @@ Study read_study(const std::filesystem::path& file, const StudyOptions& options)
   if (options.time_limit) study.sampling.time_limit = *options.time_limit;
   const std::vector<Sweep> sweeps = read_sweeps(file, study.text, options.scenes, options.sizes);
 
-  std::set<std::string> names;
-  std::vector<std::string> comparisons;
+  std::set<std::string> names, trades;  // trades: those with a literal program
+  std::vector<PlannedPoint> all;
   std::map<std::string, SceneReference> references;
   for (const Sweep& sweep : sweeps) {
     for (const SceneReference& reference : sweep.scenes) {
@@ -100,14 +111,21 @@ Study read_study(const std::filesystem::path& file, const StudyOptions& options)
       if (!names.insert(planned.name).second) return;
       if (options.filter && std::regex_search(planned.name, *options.filter) == options.filter_excludes)
         return;
-      const std::size_t comparison = index_of(comparison_of(point), comparisons);
-      if (comparison % static_cast<std::size_t>(options.shards) !=
-          static_cast<std::size_t>(options.shard - 1))
-        return;
-      planned.skip =
-          reason_to_skip(point, study.scenes.at(point.scene.name), study.sampling, options.oversubscribe);
-      study.points.push_back(std::move(planned));
+      if (is_literal_program(point)) trades.insert(trade_of(point));
+      all.push_back(std::move(planned));
     });
+  }
+  std::vector<std::string> comparisons;
+  for (PlannedPoint& planned : all) {
+    const Point& point = planned.point;
+    const std::string trade = trade_of(point);
+    const std::size_t comparison =
+        index_of(trades.contains(trade) ? trade : comparison_of(point), comparisons);
+    if (comparison % static_cast<std::size_t>(options.shards) != static_cast<std::size_t>(options.shard - 1))
+      continue;
+    planned.skip =
+        reason_to_skip(point, study.scenes.at(point.scene.name), study.sampling, options.oversubscribe);
+    study.points.push_back(std::move(planned));
   }
   if (static_cast<std::size_t>(options.shards) > comparisons.size() && !comparisons.empty())
     throw InputError(

@@ -58,8 +58,15 @@ struct StudyOptions {
 Study read_study(const std::filesystem::path& file, const StudyOptions& options);
 
 /// What `point` is compared with: equal for points that differ only in strategy, execution and environment.
-/// Shards hold whole comparisons, bases included, so that a speedup never compares two machines.
+/// Shards hold whole comparisons, bases included (where there is a literal program, all of its trade), so that a speedup never compares two machines.
 std::string comparison_of(const Point& point);
+
+/// comparison_of() without the numeric mode: what the literal program is the base of.
+std::string trade_of(const Point& point);
+
+/// The literal program of the course text: its formula, serially, without any structure but boxes. The base
+/// of the trade between speed and accuracy, sampled along with every point of its scene and size.
+bool is_literal_program(const Point& point);
 
 /// Equal for points that differ only in threads: the others are one curve over them.
 std::string family_of(const Point& point);

@@ -160,13 +160,42 @@ std::vector<int> parse_threads(const std::string& text) {
   return counts;
 }
 
-std::vector<std::string> kernel_list(const std::string& word) {
+/// Whether `kernel` can carry `mode`, on a CPU that has what the mode needs.
+bool carries(const std::string& kernel, const std::string& mode) {
+  const Kernel::Variant& variant = find_kernel(kernel).variant(mode);
+  return variant.make || variant.reason == find_mode(mode)->unavailable;
+}
+
+/// The names of a list in which "all" stands for `everything` that `suits`.
+std::vector<std::string> expanded(const std::vector<std::string>& words,
+                                  const std::vector<std::string>& everything,
+                                  const std::function<bool(const std::string&)>& suits) {
   std::vector<std::string> names;
+  for (const std::string& word : words)
+    if (word == "all")
+      std::copy_if(everything.begin(), everything.end(), std::back_inserter(names), suits);
+    else
+      names.push_back(word);
+  return names;
+}
+
+/// Replaces "all": among the kernels by those that can carry a mode of the sweep, among the modes by those
+/// that a kernel of the sweep can carry.
+void expand_all(Sweep& sweep) {
+  std::vector<std::string> kernel_names, mode_names;
   for (const Kernel& kernel : kernels())
-    if (!kernel.info().hidden) names.emplace_back(kernel.info().name);
-  if (word == "all") return names;
-  find_kernel(word);
-  return {word};
+    if (!kernel.info().hidden) kernel_names.emplace_back(kernel.info().name);
+  for (const ModeInfo& mode : mode_infos()) mode_names.emplace_back(mode.name);
+  const auto everything = [](const std::string&) { return true; };
+  const auto all_modes = expanded(sweep.numerics, mode_names, everything);
+  sweep.kernels = expanded(sweep.kernels, kernel_names, [&](const std::string& kernel) {
+    return std::any_of(all_modes.begin(), all_modes.end(),
+                       [&](const std::string& mode) { return carries(kernel, mode); });
+  });
+  sweep.numerics = expanded(sweep.numerics, mode_names, [&](const std::string& mode) {
+    return std::any_of(sweep.kernels.begin(), sweep.kernels.end(),
+                       [&](const std::string& kernel) { return carries(kernel, mode); });
+  });
 }
 
 /// An execution of the list, with chunks multiplied in where the schedule takes one and none is written.
@@ -215,15 +244,14 @@ Sweep read_sweep(const toml::table& table, const std::string& file, const std::f
     sweep.scenes.back().line = static_cast<std::int64_t>(node.source().begin.line);
   });
   reader.strings("size", sweep.sizes, [](const std::string& s) { return parse_size(s, "size"); });
-  reader.each("kernel", [&](const toml::node& node) {
-    if (!node.is_string()) reader.fail(node, "kernel", "must be a string");
-    const auto names =
-        reader.located(node, "kernel", [&] { return kernel_list(*node.value<std::string>()); });
-    sweep.kernels.insert(sweep.kernels.end(), names.begin(), names.end());
+  reader.strings("kernel", sweep.kernels, [](const std::string& word) {
+    if (word != "all") find_kernel(word);
+    return word;
   });
-  std::vector<std::string> modes;
+  std::vector<std::string> modes{"all"};
   for (const ModeInfo& info : mode_infos()) modes.emplace_back(info.name);
   reader.words("numeric", modes, "f32", sweep.numerics);
+  expand_all(sweep);
   reader.strings("fill", sweep.fills, [](const std::string& s) { return parse_fill(s, "fill"); });
   reader.strings("near", sweep.nears, [](const std::string& s) { return parse_near(s, "near"); });
   std::vector<ExecutionConfig> executions;
