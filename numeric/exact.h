@@ -36,7 +36,7 @@ struct Exact : ExactKeys {
   }
 
   static bool inside(const Prepared& p, std::int32_t x, std::int32_t y) {
-    return inside_edge(p, 0, x, y) && inside_edge(p, 1, x, y) && inside_edge(p, 2, x, y);
+    return FilteredEdges::inside(p, x, y);
   }
 
   static float edge_value(const Prepared& p, int e, std::int32_t x, std::int32_t y) {

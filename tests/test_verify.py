@@ -1,0 +1,126 @@
+"""`rasterbench verify`: the verdicts on kernels and numeric modes, the difference image, and the story of a pixel."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from .conftest import SmallScene
+from .program import refused, read_png, run, snapshot
+
+
+def rows(*arguments: object, code: int = 0) -> dict[tuple[str, str], dict[str, Any]]:
+    """By (numeric, kernel)."""
+    outcome = run("verify", *arguments, "--json")
+    assert outcome.code == code, outcome.stderr
+    return {(row["numeric"], row["kernel"]): row for row in json.loads(outcome.stdout)}
+
+
+def listed_numerics() -> dict[str, dict[str, Any]]:
+    return {mode["name"]: mode for mode in json.loads(run("list", "numerics", "--json").ok().stdout)}
+
+
+@pytest.mark.parametrize("scene", ["teapot", "crossing"])
+def test_every_mode_conforms_and_keeps_its_bound(scene: str, request: pytest.FixtureRequest) -> None:
+    drawn: SmallScene = request.getfixturevalue(scene)
+    modes = listed_numerics()
+    verdicts = rows(drawn.dat, drawn.txt)
+    assert {numeric for numeric, _ in verdicts} == {name for name, mode in modes.items() if mode["available"]}
+    for (numeric, kernel), row in verdicts.items():
+        verify = row["verify"]
+        assert row["failure"] is None and verify["conforms"], (numeric, kernel, row["failure"])
+        assert verify["bound"]["bounded"] == modes[numeric]["bounded"]
+        truth = verify["end_to_end"]
+        assert truth["errors"] == 0
+        assert truth["pixels"] == truth["identical"] + truth["ambiguous"] + truth["wrong"]
+        if numeric == "ray_cast":
+            assert verify["oracle"] is None
+            continue
+        oracle = verify["oracle"]
+        assert oracle["unexplained"] == 0 and oracle["within_bound"]
+        assert oracle["wrong"] == oracle["exact_ties"] + oracle["edge"] + oracle["depth"] + oracle["unbounded"]
+        if verify["bound"]["bounded"]:
+            assert oracle["wrong"] <= oracle["predicted"], numeric
+        if numeric.startswith("filtered") or numeric == "exact":
+            assert oracle["false_positives"] == oracle["false_negatives"] == oracle["edge"] == 0, numeric
+        if numeric == "exact":
+            assert oracle["wrong"] == oracle["predicted"] == 0
+        if numeric.startswith("fixed"):
+            assert oracle["edge_on_snapped"] == 0, numeric
+        if "skipped" not in verify["embree"]:
+            assert verify["embree"]["errors"] == 0, numeric
+
+
+def test_a_kernel_that_does_not_conform_fails(teapot: SmallScene) -> None:
+    outcome = run("verify", teapot.dat, teapot.txt, "--kernel", "null", "--kernel", "scanline", "--numeric", "f32")
+    assert outcome.code == 1
+    assert re.search(r"f32 +null +NO", outcome.stdout)
+    assert re.search(r"f32 +scanline +yes", outcome.stdout)
+    assert "FAILED null f32:" in outcome.stdout and "pixels differ from the specification" in outcome.stdout
+
+
+def test_the_table_names_unbounded_modes(teapot: SmallScene) -> None:
+    outcome = run("verify", teapot.dat, teapot.txt, "--numeric", "two_product", "--numeric", "exact").ok()
+    assert re.search(r"two_product .* unbounded", outcome.stdout)
+    assert re.search(r"^exact .* exact$", outcome.stdout, re.MULTILINE)
+
+
+def test_a_coarse_grid_is_wrong_where_the_difference_image_says(teapot: SmallScene, tmp_path: Path) -> None:
+    image = tmp_path / "difference.png"
+    run("verify", teapot.dat, teapot.txt, "--numeric", "fixed_4", "--difference", image).ok()
+    wrong = rows(teapot.dat, teapot.txt, "--numeric", "fixed_4")["fixed_4", "tile_parallel"]["verify"]["oracle"]["wrong"]
+    assert wrong > 0
+    pixels = read_png(image).astype(int)
+    p = teapot.parameters
+    assert pixels.shape[1] == p.width and pixels.shape[0] > p.height  # a legend below
+    coloured = np.ptp(pixels[: p.height], axis=2) > 30
+    assert wrong <= np.count_nonzero(coloured) <= 9 * wrong
+
+
+def test_the_story_of_a_pixel(teapot: SmallScene, tmp_path: Path) -> None:
+    p = teapot.parameters
+    ids = tmp_path / "ids.npy"
+    run("render", teapot.dat, teapot.txt, "--ids", ids).ok()
+    drawn = np.load(ids)
+    y, x = (int(v) for v in np.argwhere(drawn >= 0)[200])
+    story = run("verify", teapot.dat, teapot.txt, "--explain", f"{x},{y}", "--numeric", "f32", "--numeric", "fixed_8").ok().stdout
+    owner = drawn[y, x]
+    for who in ("exact oracle", "end-to-end truth", "f32", "fixed_8"):
+        assert re.search(rf"^  {who}.* triangle {owner}$", story, re.MULTILINE), story
+    block = story[story.index(f"\ntriangle {owner}"):].split("\n\n")[0]
+    exact, single = (re.search(rf"^  {name} +yes +(\S+) +(\S+) +(\S+) +(\S+)$", block, re.MULTILINE) for name in ("exact", "f32"))
+    assert exact and single, block
+    for a, b in zip(exact.groups(), single.groups()):
+        assert float(a) == pytest.approx(float(b), rel=1e-4, abs=1e-4)
+    assert "no triangle claims this pixel" in run("verify", teapot.dat, teapot.txt, "--explain", "0,0", "--numeric", "f32").ok().stdout
+    assert drawn[0, 0] == -1 and p.width > 0
+
+
+@pytest.mark.parametrize("arguments, words", [
+    (["--numeric", "f23"], ["--numeric", "f23", "f32"]),
+    (["--kernel", "tiles"], ["kernel", "tiles"]),
+    (["--explain", "1"], ["--explain", "X,Y"]),
+    (["--explain", "1,x"], ["--explain", "X,Y"]),
+    (["--explain", "97,0"], ["--explain", "97x61"]),
+    (["--explain", "0,-1"], ["--explain", "97x61"]),
+    (["--explain", "99999999999999,0"], ["--explain", "X,Y"]),
+    (["--difference", "d.png"], ["--difference", "one"]),
+    (["--difference", "missing/d.png", "--numeric", "f32"], ["missing"]),
+    (["--difference", "d.gif", "--numeric", "f32"], ["d.gif"]),
+    (["--difference", "d.png", "--numeric", "ray_cast"], ["--difference"]),
+    (["--size", "0x5"], ["--size"]),
+    (["--fill", "open"], ["--fill"]),
+    (["--threads", "0"], ["--threads"]),
+])
+def test_bad_options(arguments: list[str], words: list[str], teapot: SmallScene, tmp_path: Path) -> None:
+    refused(run("verify", teapot.dat, teapot.txt, *arguments, cwd=tmp_path), *words)
+    assert snapshot(tmp_path) == {}
+
+
+def test_an_option_that_needs_a_model() -> None:
+    refused(run("verify", "--explain", "0,0"), "--explain", "MODEL")
