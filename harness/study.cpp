@@ -9,6 +9,7 @@
 #include "base/suggest.h"
 #include "harness/study_reader.h"
 #include "kernels/kernel.h"
+#include "reference/ray_cast_frame.h"
 
 namespace rasterbench {
 namespace {
@@ -31,6 +32,13 @@ std::string reason_to_skip(const Point& point, const Scene& scene, const Samplin
                        available_cpus());
   if (point.execution.backend == "tbb" && point.environment != Environment{})
     return "binding, wait policy and runtime are OpenMP's; OMP_PROC_BIND would narrow oneTBB to one worker";
+  if (!find_mode(point.numeric)->has_screen_triangles) {
+    try {
+      check_ray_cast_settings(point.settings());
+    } catch (const InputError& error) {
+      return error.what();
+    }
+  }
   if (kernel.info().tests_every_pixel) {
     const double frame = static_cast<double>(scene.model.triangles.size()) * point.width * point.height *
                          kSecondsPerTest / point.execution.threads;
@@ -59,6 +67,7 @@ std::string comparison_of(const Point& point) {
   common.execution = {};
   common.environment = {};
   common.tile = Point().tile;
+  common.generality = Point().generality;
   return point_name(common);
 }
 

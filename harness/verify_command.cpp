@@ -9,6 +9,7 @@
 #include "harness/progress.h"
 #include "harness/verdict_json.h"
 #include "kernels/kernel.h"
+#include "reference/ray_cast_frame.h"
 #include "scene/image.h"
 
 namespace rasterbench {
@@ -135,6 +136,7 @@ int verify_scene(const VerifyOptions& options, const std::string& model, Json& r
   }
   Progress progress;
   std::vector<std::pair<std::string, std::string>> failures;
+  std::vector<std::string> notes;
   std::size_t done = 0;
   for (const std::string& name : options.numerics) {
     const ModeInfo& mode = available_mode(name, "--numeric");
@@ -143,6 +145,14 @@ int verify_scene(const VerifyOptions& options, const std::string& model, Json& r
       if (find_kernel(kernel).variant(name).make) kernels.push_back(kernel);
     ++done;
     if (kernels.empty()) continue;
+    if (!mode.has_screen_triangles) {
+      try {
+        check_ray_cast_settings(settings);
+      } catch (const InputError& error) {
+        notes.push_back(fmt::format("{} left out: {}", name, error.what()));
+        continue;
+      }
+    }
     progress.show("verifying", static_cast<double>(done), static_cast<double>(options.numerics.size()), name);
     const Picture specification = render_specification(scene, name, settings);
     const Json verdicts = judge_picture(judge, specification, mode);
@@ -173,6 +183,7 @@ int verify_scene(const VerifyOptions& options, const std::string& model, Json& r
                    ? fmt::format("{}: build {:.1f} ms, trace {:.1f} ms", embree_version(),
                                  judge.rays(false).build_seconds * 1e3, judge.rays(false).trace_seconds * 1e3)
                    : "skipped: " + embree_version());
+    for (const std::string& note : notes) fmt::print("{}\n", note);
     for (const auto& [point, reason] : failures) fmt::print("FAILED {}: {}\n", point, reason);
     if (!options.difference.empty()) fmt::print("wrote {}\n", options.difference);
   }

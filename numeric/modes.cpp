@@ -28,6 +28,9 @@ std::span<const ModeInfo> mode_infos() {
       if constexpr (requires { Mode::unavailable(); }) all.back().unavailable = Mode::unavailable();
     });
     all.push_back(kRayCastInfo);
+#if defined(RASTERBENCH_WITHOUT_EMBREE)
+    all.back().unavailable = "Embree was not found when this was built";
+#endif
     return all;
   }();
   return infos;

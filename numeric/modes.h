@@ -350,8 +350,8 @@ inline constexpr ModeInfo kRayCastInfo{
     .vertices = "float32 world coordinates",
     .edges = "Embree's ray-triangle test, float32, one ray per sample (fill rule: closed)",
     .depth = "float32 d of the hit",
-    .bound = "edge and depth ties within a bound stated per pixel in reference/embree.cpp",
-    .bound_source = "forward error of float32 rays",
+    .bound = "wrong only at edges and near ties in depth, within a bound per pixel",
+    .bound_source = "forward error of float32 rays (reference/ray_comparison.cpp)",
     .numbers = {},
     .same_on_every_cpu = false,
     .has_screen_triangles = false};
