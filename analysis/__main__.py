@@ -1,4 +1,4 @@
-"""Command line: python3 -m analysis report DIR, python3 -m analysis table DIR."""
+"""Command line: python3 -m analysis report DIR, table DIR, stability FILE."""
 
 from __future__ import annotations
 
@@ -32,6 +32,11 @@ def parser() -> Parser:
     for command in (report, table):
         command.add_argument("directory", metavar="DIR", type=Path,
                              help="folder of a study, with context.json and records.jsonl (see harness/records.md)")
+    stability = commands.add_parser("stability", help="draw the stability envelopes of numeric modes and list their breaking points",
+                                    description="Writes FOLDER/stability.png, .svg, .pdf, .csv, .tex and its caption, .txt, then"
+                                                " prints where each numeric mode breaks.")
+    stability.add_argument("file", metavar="FILE", type=Path, help="the sweeps, one JSON object a line (stability.jsonl)")
+    stability.add_argument("-o", "--out", metavar="FOLDER", type=Path, help="where to write (default: the folder of FILE)")
     report.add_argument("--out", metavar="FILE", type=Path, help="where to write the report (default: DIR/report.html)")
     return main
 
@@ -39,6 +44,13 @@ def parser() -> Parser:
 def main(arguments: list[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     try:
+        if options.command == "stability":
+            from . import stability
+
+            written = stability.write(options.file, options.out or options.file.parent)
+            print(stability.plain(options.file))
+            print(f"written: {', '.join(map(str, written))}")
+            return 0
         study = load(options.directory)
         # Imported late: a wrong path should not wait for matplotlib.
         from .comparison import Analysis
@@ -57,7 +69,7 @@ def main(arguments: list[str] | None = None) -> int:
     except BrokenPipeError:
         return 0
     except OSError as error:
-        print(f"analysis: {error.filename or options.directory}: {error.strerror or error}", file=sys.stderr)
+        print(f"analysis: {error.filename or vars(options).get('directory') or options.file}: {error.strerror or error}", file=sys.stderr)
         return 2
     print(f"report: {written.path}")
     for finding in written.findings:

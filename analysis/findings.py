@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 from typing import Callable, Iterator
 
-from . import statistics, text
+from . import statistics, text, trade_text
 from .comparison import Analysis, Group, Panel
 from .figures.balance import imbalance
 from .figures.scaling import curves
@@ -70,15 +70,17 @@ def fastest(analysis: Analysis) -> Iterator[Finding]:
 
 def winners(analysis: Analysis) -> Iterator[Finding]:
     """Whether the choice of kernel depends on the scene; only where each scene has a winner that stands."""
-    named: dict[str, list[str]] = {}
+    named: dict[str, dict[str, list[str]]] = {}  # by everything but the scene: another arithmetic is another question
     for group in analysis.groups:
         rivals = [r for r in group.timed if group.best is not None and r.config.kernel != group.best.config.kernel]
         if not rivals or any(group.comparisons[r.id].verdict != "slower" for r in rivals):
             continue
-        named.setdefault(group.best.config.kernel, []).append(f"{where(group)} ({analysis.time(group.best)})")
-    if len(named) > 1:
-        said = text.listing([f"{kernel} on {text.listing(places, 2)}" for kernel, places in named.items()], 4)
-        yield Finding("winners", 4.5, f"The fastest kernel depends on the scene: {said}.")
+        rules = group.title.removeprefix(f"{group.best.config.scene} ").partition(" ")[2]
+        named.setdefault(rules, {}).setdefault(group.best.config.kernel, []).append(f"{where(group)} ({analysis.time(group.best)})")
+    for kernels in named.values():
+        if len(kernels) > 1:
+            said = text.listing([f"{kernel} on {text.listing(places, 2)}" for kernel, places in kernels.items()], 4)
+            yield Finding("winners", 4.5, f"The fastest kernel depends on the scene: {said}.")
 
 
 def parallel_gain(analysis: Analysis) -> Iterator[Finding]:
@@ -266,6 +268,13 @@ def accuracy_limits(analysis: Analysis) -> Iterator[Finding]:
                       f" accuracy bound against the oracle (numeric {modes}).")
 
 
+def trade_off(analysis: Analysis) -> Iterator[Finding]:
+    """What accuracy costs, where a study measured it: then it is what the study was made for."""
+    said = trade_text.finding(analysis)
+    if said is not None:
+        yield Finding("trade", 6.0, said)
+
+
 def plain_facts(analysis: Analysis) -> Iterator[Finding]:
     """What can always be said, so that a small study has three lines too."""
     study = analysis.study
@@ -296,7 +305,8 @@ def plain_facts(analysis: Analysis) -> Iterator[Finding]:
 
 
 FINDERS: tuple[Callable[[Analysis], Iterator[Finding]], ...] = (
-    fastest, winners, parallel_gain, scaling, schedules, backends, stage_share, balance, untimed, accuracy_limits, plain_facts)
+    fastest, winners, parallel_gain, scaling, schedules, backends, stage_share, balance, untimed, accuracy_limits, trade_off,
+    plain_facts)
 
 
 def candidates(analysis: Analysis) -> list[Finding]:

@@ -14,6 +14,9 @@ from .statistics import Samples, is_number
 
 SCHEMA = 1
 STAGES = ("clear", "geometry", "raster", "resolve")
+# What tables and plots of accuracy count; null where a mode has none.
+COUNTED = {"wrong", "exact_ties", "edge", "depth", "unexplained", "unbounded", "predicted", "wrong_on_snapped", "worst_distance_px",
+           "max_depth_error_steps", "ambiguous", "edge_ties", "depth_ties", "errors", "false_positives", "false_negatives"}
 STATUSES = ("ok", "failed", "skipped")
 
 
@@ -47,6 +50,7 @@ class Config:
     wait_policy: str | None = None
     runtime: str | None = None
     tile: int | str | None = None
+    generality: str | None = None
 
 
 @dataclass(frozen=True)
@@ -121,16 +125,16 @@ def load(directory: Path) -> Study:
     return Study(directory, context, _records(directory / "records.jsonl"))
 
 
-def _read(path: Path) -> str:
+def read_text(path: Path, missing: str = "no such file (was the study interrupted? run it again with --resume)") -> str:
     try:
         return path.read_text(encoding="utf-8")
     except FileNotFoundError:
-        raise InputError(path, "no such file (was the study interrupted? run it again with --resume)") from None
+        raise InputError(path, missing) from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(path, f"cannot be read: {error}") from None
 
 
-def _parse(text: str, path: Path, line: int | None) -> dict[str, Any]:
+def parse(text: str, path: Path, line: int | None) -> dict[str, Any]:
     def refuse(name: str) -> float:
         raise ValueError(f"{name} is not a JSON number")
 
@@ -153,7 +157,7 @@ def _schema(value: dict[str, Any], path: Path, line: int | None) -> None:
 
 
 def _context(path: Path) -> dict[str, Any]:
-    context = _parse(_read(path), path, None)
+    context = parse(read_text(path), path, None)
     _schema(context, path, None)
     for key in ("program", "machine", "study"):
         if key not in context:
@@ -171,10 +175,10 @@ def _context(path: Path) -> dict[str, Any]:
 def _records(path: Path) -> list[Record]:
     records: list[Record] = []
     seen: dict[str, int] = {}
-    for line, text in enumerate(_read(path).split("\n"), start=1):
+    for line, text in enumerate(read_text(path).split("\n"), start=1):
         if not text.strip():
             continue
-        value = _parse(text, path, line)
+        value = parse(text, path, line)
         record = _Reader(path, line, value).record()
         if record.id in seen:
             raise InputError(path, f"{record.id} is also on line {seen[record.id]}", line, "id")
@@ -212,7 +216,7 @@ class _Reader:
         reason = str(value.get("reason") or "")
         if status != "ok" and not reason:
             raise self.fail("reason", f"missing, status is {status!r}")
-        verify = self.mapping("verify", required=status == "ok")
+        verify = self.verdicts(required=status == "ok")
         samples = self.samples() if status == "ok" else None
         stages = self.stages(samples.n) if samples else {}
         if status == "ok" and verify.get("conforms") is not True:
@@ -240,6 +244,19 @@ class _Reader:
             raise self.fail(key, "expected an object")
         return value or {}
 
+    def verdicts(self, required: bool) -> dict[str, Any]:
+        verify = self.mapping("verify", required)
+        for part in ("oracle", "end_to_end", "embree", "bound"):
+            if verify.get(part) is None:
+                continue
+            if not isinstance(verify[part], dict):
+                raise self.fail(f"verify.{part}", "expected an object or null")
+            for key in COUNTED & verify[part].keys():
+                value = verify[part][key]
+                if value is not None and not (is_number(value) and (value >= 0 or key == "predicted")):
+                    raise self.fail(f"verify.{part}.{key}", f"expected a number that is not below 0, or null, found {value!r}")
+        return verify
+
     def config(self) -> Config:
         if "config" not in self.value:
             raise self.fail("config", "missing")
@@ -259,7 +276,7 @@ class _Reader:
         if config["schedule"] is not None:
             self.text(config, "schedule", "config.")
         known = {axis.name: config.get(axis.name) for axis in fields(Config)}
-        for key in ("scene_hash", "binding", "wait_policy", "runtime", "tile"):
+        for key in ("scene_hash", "binding", "wait_policy", "runtime", "tile", "generality"):
             if isinstance(known[key], (list, dict)):  # a tile of [32, 32], say: kept as text, it is only a label
                 known[key] = json.dumps(known[key])
         return Config(**(known | {"size": tuple(size)}))

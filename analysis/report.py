@@ -12,11 +12,15 @@ import jinja2
 import matplotlib
 from markupsafe import Markup
 
-from . import __version__, checks, figures, findings, statistics, style, tables, text, writing
+from . import (__version__, checks, figures, findings, statistics, style, tables, text, trade, trade_tables, trade_text,
+               writing)
 from .captions import Caption
 from .comparison import Analysis
+from .figures.common import drawn_together
 from .findings import Finding
 from .tables import Table
+
+MANY_SMALL = 6  # groups of few points; the tables of more are in tables/ only
 
 
 @dataclass(frozen=True)
@@ -44,7 +48,10 @@ def write(analysis: Analysis, out: Path | None = None) -> Written:
             files |= {f"{drawing.name}.{kind}": content for kind, content in made.items()}
             uri = data_uri("image/png", made["png"]) if drawing.raster else data_uri("image/svg+xml", made["svg"])
             sections.setdefault(drawing.section, []).append(Embedded(drawing.name, number, uri, drawing.caption))
-    found = tables.tables(analysis)
+    found = tables.tables(analysis) + trade_tables.tables(analysis)
+    for table in found:
+        if table.section:
+            sections.setdefault(table.section, [])  # a section may have tables and no figure
     top = findings.top(analysis)
     html = render(analysis, sections, found, top)
     path = out if out is not None else directory / "report.html"
@@ -62,26 +69,44 @@ def data_uri(kind: str, content: bytes) -> str:
 def render(analysis: Analysis, sections: dict[str, list[Embedded]], found: list[Table], top: list[Finding]) -> str:
     environment = jinja2.Environment(loader=jinja2.FileSystemLoader(Path(__file__).parent), autoescape=True,
                                      undefined=jinja2.StrictUndefined, trim_blocks=False)
-    study = analysis.study
+    study, hidden = analysis.study, small_tables(analysis)
     about = study.context["study"]
     return environment.get_template("report.html.j2").render(
         title=study.name, question=about.get("question") or "", findings=top, warnings=checks.check(analysis),
         counts=counts(analysis), run_facts=run_facts(analysis), machine_facts=machine_facts(study.context),
-        section_tables=placed(found), sections=list(sections.items()), context=recorded(study.context), cell_class=cell_class,
+        placed_tables=placed(found, hidden), hidden=len(hidden), section_words={trade.SECTION: trade_text.summary(analysis)},
+        section_tables=by_section(found), sections=list(sections.items()), context=recorded(study.context), cell_class=cell_class,
+        trade_section=f"\u201c{trade.SECTION}\u201d",
         version=__version__, records=f"{text.count(len(study.records), 'record')} in {study.directory.name}/records.jsonl",
         min_launches=statistics.MIN_LAUNCHES)
 
 
-def placed(found: list[Table]) -> dict[str, list[Table]]:
+def small_tables(analysis: Analysis) -> set[str]:
+    """Names of the tables of groups that have no figures of their own, where a study has many: with 25 numeric modes on five
+    scenes 250 tables of two rows would bury the others."""
+    small = [group for group in analysis.groups if drawn_together(analysis, group)]
+    return {f"{kind}_{group.slug}" for group in small for kind in ("points", "matrix")} if len(small) > MANY_SMALL else set()
+
+
+def placed(found: list[Table], hidden: set[str]) -> dict[str, list[Table]]:
     """Where each table stands: what was run, verification, results, or folded because it is long."""
     places: dict[str, list[Table]] = {"run": [], "verification": [], "results": [], "long": []}
     for table in found:
+        if table.section or table.name in hidden:
+            continue
         kind = ("run" if table.name == "not_timed" else "verification" if table.name == "verification" else
                 "long" if table.name in ("stages", "over_scenes") and len(table.words) > 12 else "results")
         places[kind].append(table)
     # The overview comes before the table that has everything.
     places["results"].sort(key=lambda table: not table.name.startswith("matrix"))
     return places
+
+
+def by_section(found: list[Table]) -> dict[str, list[Table]]:
+    sections: dict[str, list[Table]] = {}
+    for table in found:
+        sections.setdefault(table.section, []).append(table)
+    return sections
 
 
 def cell_class(cell: object) -> Markup:

@@ -194,6 +194,32 @@ def ratio_of_sums(numerators: Sequence[Samples], denominators: Sequence[Samples]
     return Estimate(above / below, low, high, n, "unpaired bootstrap")
 
 
+def geometric_mean(ratios: Sequence[Estimate]) -> Estimate:
+    """Over scenes: the geometric mean of ratios, the one mean that gives the same order whichever point is the base.
+
+    The half widths of the intervals on the log scale add up as roots of summed squares, each side on its own (Zou and
+    Donner, Construction of confidence limits about effect measures, 2008). The scenes count as independent.
+    """
+    logs = np.log([r.value for r in ratios])
+    value, n = float(np.exp(logs.mean())), min(r.n for r in ratios)
+    if not all(r.has_interval for r in ratios):
+        return Estimate(value, None, None, n, "none", "a scene has no interval")
+    below, above = (float(np.linalg.norm(logs - np.log(bounds))) / len(ratios)
+                    for bounds in ([r.low for r in ratios], [r.high for r in ratios]))
+    return Estimate(value, value * math.exp(-below), value * math.exp(above), n, "combined from the scenes' intervals")
+
+
+def widened(estimate: Estimate, family: float) -> Estimate:
+    """The interval of a ratio at level 0.05 / family (Bonferroni): its ends move out as those of a normal distribution on
+    the log scale would."""
+    if not estimate.has_interval:
+        return estimate
+    tail = (1 - CONFIDENCE) / 2
+    factor = float(stats.norm.ppf(1 - tail / max(1.0, family)) / stats.norm.ppf(1 - tail))
+    low, high = (estimate.value * (bound / estimate.value) ** factor for bound in (estimate.low, estimate.high))
+    return replace(estimate, low=low, high=high)
+
+
 def harmonic_mean(rates: Sequence[float]) -> float:
     """The mean of rates over equal amounts of work: total work / total time."""
     values = np.asarray(rates, dtype=float)

@@ -13,6 +13,7 @@ from .comparison import GROUP_AXES, Analysis, Group
 from .load import Record
 from .statistics import Comparison, Estimate
 
+FORMER = {"edge": "edge_ties", "depth": "depth_ties", "unexplained": "errors"}  # classes of wrong pixels in older records
 VERDICTS = {"best": "fastest", "same": "same as fastest", "ambiguous": "not told apart", "slower": "slower"}
 
 
@@ -24,6 +25,8 @@ class Table:
     numbers: pd.DataFrame  # full precision, one column a number
     words: pd.DataFrame  # rounded, with intervals
     marked: frozenset[int] = field(default_factory=frozenset)  # rows of words to set off
+    section: str = ""  # stands with the figures of this section; else in a section of tables
+    folded: bool = False  # in the report behind its title
 
     def csv(self) -> str:
         return self.numbers.to_csv(index=False, lineterminator="\n")
@@ -33,24 +36,28 @@ class Table:
 
 
 def accuracy(record: Record) -> str:
-    """The second verdict: how the picture compares with an independent renderer."""
+    """The second verdict: how the picture compares with the oracle."""
     oracle = record.verify.get("oracle")
     if not isinstance(oracle, dict):
         return "not judged"
-    differences = [oracle.get(key) for key in ("edge_ties", "depth_ties", "errors", "max_depth_error_steps")]
+    bound = record.verify.get("bound")
+    if isinstance(bound, dict) and bound.get("bounded") is False or oracle.get("predicted") == -1:
+        return "unbounded"
+    counts = ("wrong",) if "wrong" in oracle else tuple(FORMER.values())
+    differences = [oracle.get(key) for key in (*counts, "max_depth_error_steps")]
     if all(d in (0, None) for d in differences) and any(d == 0 for d in differences):
         return "exact"
     within = oracle.get("within_bound")
     return "within its bound" if within is True else "outside its bound" if within is False else "not judged"
 
 
-def _columns(name: str, estimate: Estimate | None) -> dict[str, float | None]:
+def columns(name: str, estimate: Estimate | None) -> dict[str, float | None]:
     if estimate is None:
         return {name: None, f"{name}_low": None, f"{name}_high": None}
     return {name: estimate.value, f"{name}_low": estimate.low, f"{name}_high": estimate.high}
 
 
-def _times(estimate: Estimate | None) -> str:
+def times(estimate: Estimate | None) -> str:
     return text.MISSING if estimate is None else text.estimate(estimate.value, estimate.low, estimate.high)
 
 
@@ -106,18 +113,18 @@ def _ordered(group: Group) -> list[Record]:
 
 
 def _measured(analysis: Analysis, record: Record, comparison: Comparison) -> dict[str, Any]:
-    row: dict[str, Any] = _columns("median_ms", analysis.estimates[record.id])
+    row: dict[str, Any] = columns("median_ms", analysis.estimates[record.id])
     row |= {"n": record.samples.n, "launches": record.samples.launch_count, "interval": analysis.estimates[record.id].kind,
             "stop": record.stop, "accuracy": accuracy(record)}
-    row |= _columns("time_over_fastest", comparison.ratio if comparison.verdict != "best" else None)
+    row |= columns("time_over_fastest", comparison.ratio if comparison.verdict != "best" else None)
     row |= {"verdict": VERDICTS[comparison.verdict], "test": comparison.test, "p_holm": comparison.p_holm,
             "superiority": comparison.superiority}
     for letter, bases in (("a", analysis.serial_base), ("b", analysis.thread_base)):
         speedup, label, seconds = _base(analysis, record, bases[record.id])
-        row |= _columns(f"speedup_{letter}", speedup) | {f"base_{letter}": label, f"base_{letter}_seconds": seconds}
+        row |= columns(f"speedup_{letter}", speedup) | {f"base_{letter}": label, f"base_{letter}_seconds": seconds}
         row[f"speedup_{letter}_kind"] = speedup.kind if speedup else None
     own = analysis.speedup(record, analysis.thread_base[record.id])
-    row |= _columns("efficiency", statistics.efficiency(own, record.config.threads) if own else None)
+    row |= columns("efficiency", statistics.efficiency(own, record.config.threads) if own else None)
     return row
 
 
@@ -126,12 +133,12 @@ def _said(analysis: Analysis, record: Record, comparison: Comparison) -> dict[st
     over, _, _ = _base(analysis, record, analysis.serial_base[record.id])
     is_base = analysis.serial_base[record.id] is record
     return {
-        "median ms [95 %]": _times(analysis.estimates[record.id]), "n": str(record.samples.n), "stop": record.stop or text.MISSING,
+        "median ms [95 %]": times(analysis.estimates[record.id]), "n": str(record.samples.n), "stop": record.stop or text.MISSING,
         "verdict": f"conforms; {accuracy(record)}",
         "time / fastest": "fastest" if comparison.verdict == "best"
-        else _times(comparison.ratio) + ("" if comparison.verdict == "slower" else " ≈"),
-        "speedup (a)": "is base (a)" if is_base else _times(over),
-        "speedup (b)": f"{_times(own)} of {text.number(seconds)} s" if own else
+        else times(comparison.ratio) + ("" if comparison.verdict == "slower" else " ≈"),
+        "speedup (a)": "is base (a)" if is_base else times(over),
+        "speedup (b)": f"{times(own)} of {text.number(seconds)} s" if own else
         ("is base (b)" if analysis.thread_base[record.id] is record else "no base")}
 
 
@@ -145,7 +152,7 @@ def matrix(analysis: Analysis, group: Group) -> Table:
         if record.ok:
             best = " *" if group.comparisons[record.id].verdict != "slower" and len(group.timed) > 1 else ""
             cell[0][record.config.kernel] = analysis.estimates[record.id].value
-            cell[1][record.config.kernel] = _times(analysis.estimates[record.id]) + best
+            cell[1][record.config.kernel] = times(analysis.estimates[record.id]) + best
         else:
             cell[1][record.config.kernel] = record.status
     frames = []
@@ -183,11 +190,11 @@ def over_scenes(analysis: Analysis) -> Table:
             rate = statistics.harmonic_mean([1000 / analysis.estimates[r.id].value for r in records])
             named = "" if base is None else f"{base[0].config.kernel} serial, {text.number(_sum(analysis, base) / 1000)} s"
             numbers.append({"numeric": kind[0], "kernel": name[0], "execution": name[1], "threads": name[2], "scenes": len(groups),
-                            "sum_of_medians_ms": total, **_columns("speedup_of_sums", ratio), "base": named,
+                            "sum_of_medians_ms": total, **columns("speedup_of_sums", ratio), "base": named,
                             "frames_per_second_harmonic": rate})
             words.append({"kernel": name[0], "execution": name[1], "threads": str(name[2]), "numeric": kind[0],
                           "sum of medians, ms": text.number(total),
-                          "speedup of the sums": "is the base" if records is base else _times(ratio),
+                          "speedup of the sums": "is the base" if records is base else times(ratio),
                           "frames/s (harmonic mean)": text.number(rate)})
     if not numbers:
         return empty
@@ -227,15 +234,26 @@ def verification(analysis: Analysis) -> Table:
                 continue
             oracle = record.verify.get("oracle") if isinstance(record.verify.get("oracle"), dict) else {}
             values = [record.verify.get("conforms"), record.verify.get("differing_pixels"), accuracy(record)]
-            values += [oracle.get(k) for k in ("identical", "edge_ties", "depth_ties", "errors", "max_depth_error_steps")]
+            values += [*_classes(oracle), oracle.get("max_depth_error_steps")]
             rows.setdefault((group.title, *map(str, values)), []).append(record)
-    names = ["scene", "conforms", "differing pixels", "accuracy", "identical", "edge ties", "depth ties", "errors",
+    names = ["scene", "conforms", "differing pixels", "accuracy", "wrong", "exact tie", "edge", "depth", "unexplained", "unbounded",
              "max depth error (steps)"]
     frame = pd.DataFrame([dict(zip(names, (text.MISSING if v == "None" else v for v in key)))
                           | {"points": len(records), "kernels": _kernels(analysis, records)}
                           for key, records in rows.items()])
-    return Table("verification", "Verification", "Conforms: the same bits as the scalar specification of the numeric mode."
-                 " Oracle classes count pixels against the independent double-precision renderer.", frame, frame.replace({"True": "yes", "False": "NO"}))
+    frame = frame.loc[:, [c not in ("exact tie", "unbounded") or bool((frame[c] != text.MISSING).any()) for c in frame]]
+    return Table("verification", "Verification", "Conforms: the same bits as the scalar specification of the numeric mode. Wrong pixels have"
+                 " another owner than the oracle's; their classes: an exact tie of depths, explained by an edge or by a depth gap"
+                 " within the mode's bound, unexplained, or of a mode without a bound.", frame, frame.replace({"True": "yes", "False": "NO"}))
+
+
+def _classes(oracle: dict[str, Any]) -> list[Any]:
+    """Wrong pixels and their classes; older records have three classes, of which the first sum is made."""
+    if "wrong" in oracle:
+        return [oracle.get(key) for key in ("wrong", "exact_ties", *FORMER, "unbounded")]
+    former = [oracle.get(key) for key in FORMER.values()]
+    known = [count for count in former if statistics.is_number(count)]
+    return [sum(known) if known else None, None, *former, None]
 
 
 def _kernels(analysis: Analysis, records: list[Record]) -> str:

@@ -19,6 +19,10 @@ void add_render_command(CLI::App& app);
 void add_study_command(CLI::App& app, Outcome& outcome, const std::vector<std::string>& benchmark_flags);
 void add_list_command(CLI::App& app);
 void add_scene_command(CLI::App& app);
+void add_advise_command(CLI::App& app, Outcome& outcome);
+void add_extremes_command(CLI::App& app, Outcome& outcome);
+void add_fuzz_command(CLI::App& app, Outcome& outcome);
+void add_stability_command(CLI::App& app);
 void add_verify_command(CLI::App& app, Outcome& outcome);
 void add_runner_command(CLI::App& app, Outcome& outcome, const std::vector<std::string>& benchmark_flags);
 
@@ -36,6 +40,7 @@ struct DrawOptions {
   std::string tie = "first";
   std::string cull = "none";
   int tile = 64;
+  std::string generality = "minimal";
 };
 
 /// The execution that the options ask for; throws InputError.
@@ -46,6 +51,7 @@ struct Drawing {
   std::string model, scene_file, image, ids, depth;
   int frames = 1;  ///< timed ones, after an untimed one
   bool quiet = false;
+  bool explain = false;  ///< say which tests the geometry stage leaves out, and why
 };
 void draw(const Drawing& drawing, const DrawOptions& options);
 

@@ -118,7 +118,8 @@ class Story {
   bool is_near(const ScreenTriangle<Real>& t) const {
     const auto [low_x, high_x] = std::minmax({t.x[0], t.x[1], t.x[2]});
     const auto [low_y, high_y] = std::minmax({t.y[0], t.y[1], t.y[2]});
-    return low_x - 1 <= x_ + 1 && high_x + 1 >= x_ && low_y - 1 <= y_ + 1 && high_y + 1 >= y_;
+    return low_x - 1 <= static_cast<Real>(x_ + 1) && high_x + 1 >= static_cast<Real>(x_) &&
+           low_y - 1 <= static_cast<Real>(y_ + 1) && high_y + 1 >= static_cast<Real>(y_);
   }
 
   template <NumericMode Mode>

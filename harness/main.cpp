@@ -36,6 +36,10 @@ int run(int argc, char** argv) {
   add_verify_command(app, outcome);
   add_list_command(app);
   add_scene_command(app);
+  add_advise_command(app, outcome);
+  add_extremes_command(app, outcome);
+  add_fuzz_command(app, outcome);
+  add_stability_command(app);
   add_runner_command(app, outcome, benchmark_flags);
   for (CLI::App* command : app.get_subcommands({})) command->set_version_flag("--version", version);
   if (!benchmark_flags.empty() && argc > 1 && argv[1] != std::string_view("study") &&

@@ -50,6 +50,7 @@ FrameSettings Point::settings() const {
   FrameSettings settings{.width = width, .height = height, .fill = fill};
   settings.geometry.near_rule = near_rule;
   settings.tile = tile;
+  settings.generality = generality;
   return settings;
 }
 
@@ -64,6 +65,7 @@ std::string point_name(const Point& p) {
   if (p.environment.runtime != normal.runtime) name += "/runtime:" + p.environment.runtime;
   if (find_kernel(p.kernel).info().has_tiles && p.tile != 64) name += fmt::format("/tile:{}", p.tile);
   if (p.cache != "warm") name += "/cache:" + p.cache;
+  if (p.generality != Generality::kMinimal) name += "/generality:full";
   return name;
 }
 
@@ -86,6 +88,7 @@ Json point_config(const Point& p) {
   config["isa"] = "baseline";
   config["output"] = "rgba8+f32";
   config["cache"] = p.cache;
+  config["generality"] = kGeneralities[p.generality == Generality::kFull];
   return config;
 }
 
@@ -113,6 +116,7 @@ Point point_from_json(const Json& json) {
   p.environment = {json.at("binding"), json.at("wait_policy"), json.at("runtime")};
   p.tile = json.at("tile");
   p.cache = json.at("cache");
+  p.generality = parse_generality(json.at("generality"), "generality");
   return p;
 }
 
@@ -154,6 +158,11 @@ FillRule parse_fill(const std::string& text, const std::string& field) {
 NearRule parse_near(const std::string& text, const std::string& field) {
   check_word(text, kNearRules, field);
   return text == "clip" ? NearRule::kClip : NearRule::kOff;
+}
+
+Generality parse_generality(const std::string& text, const std::string& field) {
+  check_word(text, kGeneralities, field);
+  return text == "full" ? Generality::kFull : Generality::kMinimal;
 }
 
 }  // namespace rasterbench

@@ -40,6 +40,7 @@ inline const std::vector<std::string> kRuntimes{"default", "libomp"};
 inline const std::vector<std::string> kFillRules{"closed", "top-left"};
 inline const std::vector<std::string> kNearRules{"clip", "off"};
 inline const std::vector<std::string> kCaches{"warm", "cold"};
+inline const std::vector<std::string> kGeneralities{"minimal", "full"};
 
 /// The text of `json`; bytes that are not UTF-8 (file names may hold any) are replaced, never an error.
 std::string dump(const Json& json, int indent = -1);
@@ -56,6 +57,7 @@ struct Point {
   Environment environment;
   int tile = 64;               ///< pixels; counts only for kernels that have tiles
   std::string cache = "warm";  ///< warm, or cold: the caches are swept before each sample
+  Generality generality = Generality::kMinimal;
 
   FrameSettings settings() const;
 };
@@ -83,6 +85,7 @@ std::pair<int, int> parse_size(const std::string& text, const std::string& field
 
 FillRule parse_fill(const std::string& text, const std::string& field);
 NearRule parse_near(const std::string& text, const std::string& field);
+Generality parse_generality(const std::string& text, const std::string& field);
 
 /// Throws InputError naming `field` unless `word` is one of `known`.
 void check_word(const std::string& word, const std::vector<std::string>& known, const std::string& field);

@@ -23,16 +23,18 @@ TEST(Point, NameHoldsEveryAxisAndOnlyUnusualExtras) {
   point.environment = {"close", "active", "libomp"};
   point.tile = 32;
   point.cache = "cold";
+  point.generality = Generality::kFull;
   EXPECT_EQ(point_name(point),
             "racer/640x480/tile_parallel/f32/closed/clip/openmp:dynamic,16/2/binding:close/wait:active/"
             "runtime:libomp/"
-            "tile:32/cache:cold");
+            "tile:32/cache:cold/generality:full");
 }
 
 TEST(Point, SurvivesJson) {
   Point point = sample_point();
   point.fill = FillRule::kTopLeft;
   point.near_rule = NearRule::kOff;
+  point.generality = Generality::kFull;
   point.execution.chunk.reset();
   const Point back = point_from_json(Json::parse(point_to_json(point).dump()));
   EXPECT_EQ(point_name(back), point_name(point));

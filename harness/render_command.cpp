@@ -28,6 +28,20 @@ ExecutionConfig execution_of(const DrawOptions& options) {
   return execution;
 }
 
+namespace {
+
+void print_needs(const Scene& scene, const FrameSettings& settings, const ModeInfo& mode) {
+  if (!mode.has_screen_triangles) return fmt::print("geometry stage: none, {} casts rays\n", mode.name);
+  if (settings.generality == Generality::kFull)
+    return fmt::print("geometry stage: every test is kept (generality = full)\n");
+  const Camera camera = sized_camera(scene, settings);
+  const NeedsAnalysis analysis = analyse_needs(
+      scene.model.triangles, make_screen_transform(camera, mode.depth_function), settings.geometry.near_rule);
+  fmt::print("geometry stage:\n{}", to_string(explain_needs(analysis, camera)));
+}
+
+}  // namespace
+
 void draw(const Drawing& drawing, const DrawOptions& options) {
   // Everything that can be wrong with the arguments is found before the model is read.
   if (!drawing.image.empty()) check_image_path(drawing.image);
@@ -41,6 +55,7 @@ void draw(const Drawing& drawing, const DrawOptions& options) {
   check_word(options.cull, {"none", "back"}, "--cull");
   settings.geometry.cull_back_faces = options.cull == "back";
   settings.tile = options.tile;
+  settings.generality = parse_generality(options.generality, "--generality");
   if (!options.size.empty()) std::tie(settings.width, settings.height) = parse_size(options.size, "--size");
   find_kernel(options.kernel).variant(options.numeric);
   const ExecutionConfig execution = execution_of(options);
@@ -78,6 +93,7 @@ void draw(const Drawing& drawing, const DrawOptions& options) {
       options.kernel, options.numeric, to_string(execution), execution.threads,
       execution.threads == 1 ? "" : "s", median(times), times.size(), s.clear * 1e3, s.geometry * 1e3,
       s.raster * 1e3, s.resolve * 1e3);
+  if (drawing.explain) print_needs(scene, settings, *find_mode(options.numeric));
   for (const std::string& file : {drawing.image, drawing.ids, drawing.depth})
     if (!file.empty()) fmt::print("wrote {}\n", file);
 }
@@ -113,6 +129,10 @@ void add_draw_options(CLI::App& command, DrawOptions& o) {
   command.add_option("--tile", o.tile, "side of a tile in pixels, for kernels that have tiles")
       ->capture_default_str()
       ->check(CLI::Range(1, 65536));
+  command
+      .add_option("--generality", o.generality,
+                  "tests of the geometry stage: minimal (those that this scene needs) or full (all)")
+      ->capture_default_str();
 }
 
 }  // namespace
@@ -132,6 +152,8 @@ void add_render_command(CLI::App& app) {
   command->add_option("--frames", drawing->frames, "timed frames, after one untimed")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000000));
+  command->add_flag("--explain", drawing->explain,
+                    "say which tests the geometry stage leaves out for this scene, and why");
   add_draw_options(*command, *options);
   command->callback([drawing, options] {
     if (drawing->image.empty() && drawing->ids.empty() && drawing->depth.empty())

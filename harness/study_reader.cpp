@@ -289,6 +289,8 @@ Sweep read_sweep(const toml::table& table, const std::string& file, const std::f
     sweep.tiles.push_back(static_cast<int>(*value));
   });
   reader.words("cache", kCaches, "warm", sweep.caches);
+  reader.strings("generality", sweep.generalities,
+                 [](const std::string& s) { return parse_generality(s, "generality"); });
   reader.reject_unknown_keys("[[sweep]]");
 
   if (sweep.kernels.empty()) reader.fail(table, "kernel", "is missing from this [[sweep]]");
@@ -297,6 +299,7 @@ Sweep read_sweep(const toml::table& table, const std::string& file, const std::f
   if (sweep.nears.empty()) sweep.nears.push_back(NearRule::kClip);
   if (sweep.threads.empty()) sweep.threads = {available_cpus()};
   if (sweep.tiles.empty()) sweep.tiles.push_back(64);
+  if (sweep.generalities.empty()) sweep.generalities.push_back(Generality::kMinimal);
   return sweep;
 }
 
@@ -379,12 +382,16 @@ void span_points(const Sweep& sweep, const std::map<std::string, Scene>& scenes,
                   for (const int threads :
                        execution.backend == "serial" ? std::vector<int>{1} : sweep.threads)
                     for (const Environment& environment : sweep.environments)
-                      for (const std::string& cache : sweep.caches) {
-                        Point point{scene,     width,     height,      kernel, numeric, fill,
-                                    near_rule, execution, environment, tile,   cache};
-                        point.execution.threads = threads;
-                        visit(point);
-                      }
+                      for (const std::string& cache : sweep.caches)
+                        for (const Generality generality :
+                             find_mode(numeric)->has_screen_triangles
+                                 ? sweep.generalities
+                                 : std::vector<Generality>{Generality::kMinimal}) {
+                          Point point{scene,     width,     height,      kernel, numeric, fill,
+                                      near_rule, execution, environment, tile,   cache,   generality};
+                          point.execution.threads = threads;
+                          visit(point);
+                        }
   }
 }
 

@@ -23,6 +23,7 @@ struct Sweep {
   std::vector<Environment> environments;
   std::vector<int> tiles;
   std::vector<std::string> caches;
+  std::vector<Generality> generalities;
 };
 
 /// Name, question, seed and [sampling] of a study file, and its text; no points yet.
@@ -33,7 +34,8 @@ std::vector<Sweep> read_sweeps(const std::filesystem::path& file, const std::str
                                const std::vector<std::string>& scenes, const std::vector<std::string>& sizes);
 
 /// Calls `visit` for every combination of a sweep. An axis that does not apply to a point is not multiplied:
-/// serial has one thread, and kernels without tiles one tile size.
+/// serial has one thread, kernels without tiles one tile size, and modes without screen triangles no geometry
+/// stage that could be more or less general.
 void span_points(const Sweep& sweep, const std::map<std::string, Scene>& scenes,
                  const std::function<void(const Point&)>& visit);
 

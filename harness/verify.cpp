@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "base/hash.h"
+#include "harness/study.h"
 #include "harness/verdict_json.h"
 #include "kernels/kernel.h"
 
@@ -41,11 +42,8 @@ std::string picture_hash(const Renderer& renderer) {
 Judge& Verifier::judge_of(const Point& point, const Scene& scene) {
   constexpr std::size_t kKept = 2;  // a study varies the fill rule within a mode; more would only cost memory
   Point relevant = point;
-  relevant.kernel = relevant.numeric = "any";
-  relevant.execution = {};
-  relevant.environment = {};
   relevant.cache = "warm";
-  const std::string key = point_name(relevant);
+  const std::string key = trade_of(relevant);
   const auto found =
       std::find_if(judges_.begin(), judges_.end(), [&](const auto& entry) { return entry.first == key; });
   if (found != judges_.end()) return *found->second;
@@ -56,11 +54,8 @@ Judge& Verifier::judge_of(const Point& point, const Scene& scene) {
 
 const Verifier::Expected& Verifier::expected(const Point& point, const Scene& scene) {
   Point relevant = point;
-  relevant.kernel = "any";
-  relevant.execution = {};
-  relevant.environment = {};
   relevant.cache = "warm";
-  const std::string key = point_name(relevant);
+  const std::string key = comparison_of(relevant);
   if (expected_.key != key) {
     expected_ = {key, render_specification(scene, point.numeric, point.settings()), {}};
     expected_.verdicts = judge_picture(judge_of(point, scene), expected_.specification,

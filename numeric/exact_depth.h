@@ -30,10 +30,13 @@ struct ExactKey {
     const double uncertain = double{a.depth.error} + double{b.depth.error};
     if (gap < -uncertain) return true;
     if (gap > uncertain) return false;
-    const int order = compare_exactly(a.depth, b.depth);
+    if (const int order = compare_exactly(a.depth, b.depth); order != 0) return order < 0;
     // A depth equal to the far plane's is not drawn, whatever its rank.
-    if (order == 0 && (a.depth.triangle == nullptr || b.depth.triangle == nullptr)) return false;
-    return order != 0 ? order < 0 : a.rank < b.rank;
+    const bool a_is_clear = a.depth.triangle == nullptr, b_is_clear = b.depth.triangle == nullptr;
+    if (a_is_clear || b_is_clear) return a_is_clear && !b_is_clear;
+    if (a.rank != b.rank) return a.rank < b.rank;
+    // Two pieces of one clipped triangle: their values are stored, and may differ in the last bit.
+    return a.depth.value < b.depth.value;
   }
   friend bool operator==(const ExactKey& a, const ExactKey& b) {
     return a.rank == b.rank && a.depth.triangle == b.depth.triangle;

@@ -1,25 +1,66 @@
-// fixed_8: snapping, and the symmetries and exactness that integers give.
+// Fixed point: snapping, and the symmetries and exactness that integers give.
 #include <gtest/gtest.h>
 
 #include <bit>
 
 #include "numeric/coverage_testing.h"
-#include "numeric/fixed_8.h"
-#include "scene/generator.h"
 
 namespace rasterbench {
 namespace {
 
-/// Where `coordinate` px is snapped to, in 1/256 px: read back from the corner that sorts first.
-std::array<std::int32_t, 2> snapped(double coordinate) {
-  const auto p = prepare<Fixed8>({coordinate, coordinate}, {coordinate + 100, coordinate + 7},
-                                 {coordinate + 50, coordinate + 90}, FillRule::kClosed);
-  return {p.ax[0], p.ay[0]};
-}
+template <class Mode, int Bits>
+struct FixedMode {
+  using Type = Mode;
+  static constexpr std::int32_t kOne = 1 << Bits;  ///< units per pixel
+};
 
-TEST(Fixed8, SnapsToTheNearestAndTiesToEven) {
-  const auto expect = [](double numerator, std::int32_t units) {  // numerator / 256 px
-    EXPECT_EQ(snapped(numerator / 256), (std::array{units, units})) << numerator;
+struct FixedNames {
+  template <class Mode>
+  static std::string GetName(int) {
+    return std::string(Mode::Type::kInfo.name);
+  }
+};
+
+template <class Mode>
+class Fixed : public testing::Test {
+ protected:
+  static constexpr std::int32_t kOne = Mode::kOne;
+
+  static Point pixels(const IntPoint& p) {
+    return {static_cast<double>(p.x) / kOne, static_cast<double>(p.y) / kOne};
+  }
+
+  static IntPoint sample(std::int32_t x, std::int32_t y) {
+    return {Int128{x} * kOne + kOne / 2, Int128{y} * kOne + kOne / 2};
+  }
+
+  /// Where `coordinate` px is snapped to, in units: read back from the corner that sorts first.
+  static std::array<std::int32_t, 2> snapped(double coordinate) {
+    const auto p = prepare<typename Mode::Type>({coordinate, coordinate}, {coordinate + 100, coordinate + 7},
+                                                {coordinate + 50, coordinate + 90}, FillRule::kClosed);
+    return {p.ax[0], p.ay[0]};
+  }
+
+  /// A random triangle on units within a 32 x 32 image and a margin.
+  static std::array<Point, 3> random_triangle(Random& random) {
+    std::array<Point, 3> t;
+    for (Point& p : t) {
+      const auto coordinate = [&] {
+        return static_cast<double>(random.bits() % (48 * std::uint64_t{kOne})) / kOne - 8;
+      };
+      p = {coordinate(), coordinate(), random.uniform(-1, 1)};
+      if (random.bits() % 2 == 0) p = {std::floor(p.x) + 0.5, std::floor(p.y) + 0.5, p.d};  // on a centre
+    }
+    return t;
+  }
+};
+using FixedModes = testing::Types<FixedMode<Fixed4, 4>, FixedMode<Fixed8, 8>, FixedMode<Fixed12, 12>,
+                                  FixedMode<Fixed8Unorm24, 8>>;
+TYPED_TEST_SUITE(Fixed, FixedModes, FixedNames);
+
+TYPED_TEST(Fixed, SnapsToTheNearestAndTiesToEven) {
+  const auto expect = [](double numerator, std::int32_t units) {  // numerator units
+    EXPECT_EQ(TestFixture::snapped(numerator / TestFixture::kOne), (std::array{units, units})) << numerator;
   };
   expect(128, 128);
   expect(128.25, 128);
@@ -34,104 +75,98 @@ TEST(Fixed8, SnapsToTheNearestAndTiesToEven) {
   expect(-1.75, -2);
 }
 
-TEST(Fixed8, SnappingDecidesACentreNearAnEdge) {
+TYPED_TEST(Fixed, SnappingDecidesACentreNearAnEdge) {
+  using M = typename TypeParam::Type;
+  constexpr double kUnit = 1.0 / TestFixture::kOne;
   const auto covers_centre = [](double left) {
-    return covers<Fixed8>(prepare<Fixed8>({left, 0}, {left, 8}, {8, 4}, FillRule::kTopLeft), 3, 3);
+    return covers<M>(prepare<M>({left, 0}, {left, 8}, {8, 4}, FillRule::kTopLeft), 3, 3);
   };
   EXPECT_TRUE(covers_centre(3.5));
-  EXPECT_TRUE(covers_centre(3.5 + 1.0 / 512));   // a tie: to even, that is onto the centre
-  EXPECT_FALSE(covers_centre(3.5 + 1.5 / 512));  // to the next 1/256
+  EXPECT_TRUE(covers_centre(3.5 + 0.5 * kUnit));    // a tie: to even, that is onto the centre
+  EXPECT_FALSE(covers_centre(3.5 + 0.75 * kUnit));  // to the next unit
 }
 
-TEST(Fixed8, EqualsExactIntegersUpToTheGuardBand) {
-  constexpr std::int64_t kBand = std::int64_t{131072} * 256;
+TYPED_TEST(Fixed, EqualsExactIntegersUpToTheGuardBand) {
+  using M = typename TypeParam::Type;
+  constexpr std::int64_t kUnit = TestFixture::kOne, kBand = 131072 * kUnit;
+  constexpr std::int64_t kFloatStep = std::max<std::int64_t>(1, kUnit / 128);  // of a float32 below 2^17 px
   Random random(31);
   const auto within = [&](std::int64_t extent) {
     return static_cast<std::int64_t>(random.bits() % static_cast<std::uint64_t>(2 * extent + 1)) - extent;
   };
   std::int64_t covered = 0, on_edges = 0;
-  for (int i = 0; i < 4000; ++i) {
-    // Corners up to +-2^17 px, on every second 1/256 px, as float32 is there, or on halves, so that edges run
+  for (int i = 0; i < 2000; ++i) {
+    // Corners up to +-2^17 px or within 512 px, as fine as float32 is there, or on halves, so that edges run
     // through centres.
-    const std::int64_t extent = i % 2 == 0 ? kBand : std::int64_t{512} * 256;
-    const std::int64_t grid = i % 4 < 2 ? 128 : 2;
+    const std::int64_t extent = i % 2 == 0 ? kBand : 512 * kUnit;
+    const std::int64_t grid = i % 4 < 2 ? kUnit / 2 : i % 2 == 0 ? kFloatStep : 1;
     IntTriangle t;
     for (IntPoint& p : t) p = {within(extent / grid) * grid, within(extent / grid) * grid};
-    const auto pixels = [](const IntPoint& p) {
-      return Point{static_cast<double>(p.x) / 256, static_cast<double>(p.y) / 256};
-    };
+    if (i % 16 == 0)  // the corners of the guard band: the largest products of all
+      for (IntPoint& p : t) p = {within(1) < 0 ? -kBand : kBand, within(1) < 0 ? -kBand : kBand};
     for (const FillRule fill : kFillRules) {
-      const auto prepared = prepare<Fixed8>(pixels(t[0]), pixels(t[1]), pixels(t[2]), fill);
+      const auto prepared =
+          prepare<M>(TestFixture::pixels(t[0]), TestFixture::pixels(t[1]), TestFixture::pixels(t[2]), fill);
       for (int k = 0; k < 40; ++k) {
         // Pixels around corners, along edges, and anywhere.
         const IntPoint &a = t[static_cast<std::size_t>(k % 3)], &b = t[static_cast<std::size_t>((k + 1) % 3)];
         const double s = k < 10 ? 0 : random.uniform();
         auto x = static_cast<std::int32_t>(
-            std::floor((static_cast<double>(a.x) + s * static_cast<double>(b.x - a.x)) / 256));
+            std::floor((static_cast<double>(a.x) + s * static_cast<double>(b.x - a.x)) / kUnit));
         auto y = static_cast<std::int32_t>(
-            std::floor((static_cast<double>(a.y) + s * static_cast<double>(b.y - a.y)) / 256));
-        x += static_cast<std::int32_t>(within(1));
-        y += static_cast<std::int32_t>(within(1));
-        const IntPoint sample{std::int64_t{x} * 256 + 128, std::int64_t{y} * 256 + 128};
-        ASSERT_EQ(covers<Fixed8>(prepared, x, y), exactly_covers(t, sample, fill))
-            << i << ": " << x << "," << y;
+            std::floor((static_cast<double>(a.y) + s * static_cast<double>(b.y - a.y)) / kUnit));
+        x = std::clamp(x + static_cast<std::int32_t>(within(1)), -131072, 131071);
+        y = std::clamp(y + static_cast<std::int32_t>(within(1)), -131072, 131071);
+        const IntPoint sample = TestFixture::sample(x, y);
+        ASSERT_EQ(covers<M>(prepared, x, y), exactly_covers(t, sample, fill)) << i << ": " << x << "," << y;
         covered += exactly_covers(t, sample, fill);
         on_edges +=
             exactly_covers(t, sample, FillRule::kClosed) != exactly_covers(t, sample, FillRule::kTopLeft);
       }
     }
   }
-  EXPECT_GT(covered, 50000);
-  EXPECT_GT(on_edges, 500);
+  EXPECT_GT(covered, 25000);
+  EXPECT_GT(on_edges, 250);
 }
 
-/// A random triangle on 1/256 px within a 32 x 32 image and a margin.
-std::array<Point, 3> random_triangle(Random& random) {
-  std::array<Point, 3> t;
-  for (Point& p : t) {
-    p.x = static_cast<double>(random.bits() % (48 * 256)) / 256 - 8;
-    p.y = static_cast<double>(random.bits() % (48 * 256)) / 256 - 8;
-    if (random.bits() % 2 == 0) p = {std::floor(p.x) + 0.5, std::floor(p.y) + 0.5};  // on a centre
-    p.d = random.uniform(-1, 1);
-  }
-  return t;
-}
-
-TEST(Fixed8, ShiftsByWholePixels) {
+TYPED_TEST(Fixed, ShiftsByWholePixels) {
+  using M = typename TypeParam::Type;
+  // As far as float32 holds the fraction bits.
+  constexpr int kFar = TestFixture::kOne > 256 ? 4000 : 65000;
   Random random(32);
-  for (int i = 0; i < 200; ++i) {
-    const auto t = random_triangle(random);
-    const int dx = i % 2 == 0 ? 17 : 65000, dy = i % 4 < 2 ? -5 : 64000;
+  for (int i = 0; i < 100; ++i) {
+    const auto t = TestFixture::random_triangle(random);
+    const int dx = i % 2 == 0 ? 17 : kFar, dy = i % 4 < 2 ? -5 : kFar - 100;
     const auto moved = [&](const Point& p) { return Point{p.x + dx, p.y + dy, p.d}; };
     for (const FillRule fill : kFillRules) {
-      const auto here = prepare<Fixed8>(t[0], t[1], t[2], fill);
-      const auto there = prepare<Fixed8>(moved(t[0]), moved(t[1]), moved(t[2]), fill);
+      const auto here = prepare<M>(t[0], t[1], t[2], fill);
+      const auto there = prepare<M>(moved(t[0]), moved(t[1]), moved(t[2]), fill);
       for (int y = -8; y < 40; ++y)
         for (int x = -8; x < 40; ++x) {
-          ASSERT_EQ(covers<Fixed8>(there, x + dx, y + dy), covers<Fixed8>(here, x, y)) << i;
-          if (covers<Fixed8>(here, x, y)) {
-            ASSERT_EQ(std::bit_cast<std::uint32_t>(Fixed8::depth(there, x + dx, y + dy)),
-                      std::bit_cast<std::uint32_t>(Fixed8::depth(here, x, y)));
+          ASSERT_EQ(covers<M>(there, x + dx, y + dy), covers<M>(here, x, y)) << i;
+          if (covers<M>(here, x, y)) {
+            ASSERT_EQ(std::bit_cast<std::uint64_t>(depth_at<M>(there, x + dx, y + dy)),
+                      std::bit_cast<std::uint64_t>(depth_at<M>(here, x, y)));
           }
         }
     }
   }
 }
 
-TEST(Fixed8, IsSymmetricInAMirrorButForTheTiesOfTopLeft) {
+TYPED_TEST(Fixed, IsSymmetricInAMirrorButForTheTiesOfTopLeft) {
+  using M = typename TypeParam::Type;
   Random random(33);
-  for (int i = 0; i < 200; ++i) {
-    const auto t = random_triangle(random);
+  for (int i = 0; i < 100; ++i) {
+    const auto t = TestFixture::random_triangle(random);
     const auto mirrored = [&](const Point& p) { return Point{32 - p.x, p.y, p.d}; };
     const auto flipped = [&](const Point& p) { return Point{p.x, 32 - p.y, p.d}; };
-    const auto here = prepare<Fixed8>(t[0], t[1], t[2], FillRule::kClosed);
-    const auto left_right =
-        prepare<Fixed8>(mirrored(t[0]), mirrored(t[1]), mirrored(t[2]), FillRule::kClosed);
-    const auto up_down = prepare<Fixed8>(flipped(t[0]), flipped(t[1]), flipped(t[2]), FillRule::kClosed);
+    const auto here = prepare<M>(t[0], t[1], t[2], FillRule::kClosed);
+    const auto left_right = prepare<M>(mirrored(t[0]), mirrored(t[1]), mirrored(t[2]), FillRule::kClosed);
+    const auto up_down = prepare<M>(flipped(t[0]), flipped(t[1]), flipped(t[2]), FillRule::kClosed);
     for (int y = -8; y < 40; ++y)
       for (int x = -8; x < 40; ++x) {
-        ASSERT_EQ(covers<Fixed8>(left_right, 31 - x, y), covers<Fixed8>(here, x, y)) << i;
-        ASSERT_EQ(covers<Fixed8>(up_down, x, 31 - y), covers<Fixed8>(here, x, y)) << i;
+        ASSERT_EQ(covers<M>(left_right, 31 - x, y), covers<M>(here, x, y)) << i;
+        ASSERT_EQ(covers<M>(up_down, x, 31 - y), covers<M>(here, x, y)) << i;
       }
   }
 }

@@ -2,6 +2,12 @@
 // division by the area can be traded for. Their bits differ between makes of CPU.
 #pragma once
 
+#include <cmath>
+#include <limits>
+#include <string_view>
+
+#include "numeric/depth.h"
+
 #if defined(__SSE__)
 #include <xmmintrin.h>
 
@@ -9,23 +15,29 @@ namespace rasterbench {
 
 inline constexpr std::string_view kReciprocalUnavailable = {};
 
+/// Not for denormals, which rcpss takes for zero.
+inline float approximate_reciprocal(float v) { return _mm_cvtss_f32(_mm_rcp_ss(_mm_set_ss(v))); }
+
+inline bool has_approximate_reciprocal(float v) { return std::abs(v) >= std::numeric_limits<float>::min(); }
+
 struct ApproximateReciprocal {
   static float quotient(float numerator, float denominator) {
-    return numerator * _mm_cvtss_f32(_mm_rcp_ss(_mm_set_ss(denominator)));
+    if (!has_approximate_reciprocal(denominator)) return numerator / denominator;
+    return numerator * approximate_reciprocal(denominator);
   }
 };
 
 /// With one step of Newton's method, which squares the relative error.
 struct NewtonReciprocal {
   static float quotient(float numerator, float denominator) {
-    const float guess = _mm_cvtss_f32(_mm_rcp_ss(_mm_set_ss(denominator)));
+    if (!has_approximate_reciprocal(denominator)) return numerator / denominator;
+    const float guess = approximate_reciprocal(denominator);
     return numerator * (guess * (2 - denominator * guess));
   }
 };
 
 }  // namespace rasterbench
 #else
-#include "numeric/depth.h"
 
 namespace rasterbench {
 

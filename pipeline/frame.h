@@ -17,6 +17,7 @@
 #include "execution/execution.h"
 #include "numeric/mode.h"
 #include "pipeline/geometry.h"
+#include "pipeline/needs.h"
 #include "scene/scene.h"
 
 namespace rasterbench {
@@ -29,6 +30,8 @@ struct FrameSettings {
   TieRule tie = TieRule::kFirst;
   GeometryOptions geometry = {};
   int tile = 64;  ///< side of the tiles in pixels, for the kernels that have tiles; never changes the picture
+  /// kMinimal: the renderer sets geometry.needs from the scene; kFull: geometry.needs is taken as it is.
+  Generality generality = Generality::kMinimal;
 
   PixelBox bounds() const { return {0, 0, width, height}; }
   SampleGrid grid() const { return {fill, width, height}; }

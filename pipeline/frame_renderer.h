@@ -97,7 +97,13 @@ class FrameRenderer final : public Renderer {
         screen_(scene_.model.triangles.size()),
         keys_(settings_.pixels(), "the visibility buffer"),
         colours_(settings_.pixels(), "the colour buffer"),
-        depths_(settings_.pixels(), "the depth buffer") {}
+        depths_(settings_.pixels(), "the depth buffer") {
+    if (settings_.generality == Generality::kMinimal)
+      settings_.geometry.needs =
+          analyse_needs(scene_.model.triangles, make_screen_transform(camera_, Mode::kDepthFunction),
+                        settings_.geometry.near_rule)
+              .needs;
+  }
 
   const FrameReport& draw() override {
     const int width = settings_.width;

@@ -2,52 +2,33 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 
 #include "base/error.h"
+#include "pipeline/corner.h"
 
 namespace rasterbench {
 namespace {
 
-/// A corner in homogeneous pixel coordinates.
-struct Corner {
-  double x, y, z, w;     // x / w and y / w in pixels, z / w the depth
-  double near_distance;  // >= 0 behind the near plane, where things are visible
-};
-
 /// A triangle cut by five planes has at most eight corners. Rounding can make a sliver slightly non-convex
 /// and cost one corner more; where even that did not fit, the corner is dropped, which moves the sliver by
 /// less than its own rounding.
-constexpr int kMaxCorners = 10;
+constexpr std::size_t kMaxCorners = 10;
 
-struct Polygon {
-  std::array<Corner, kMaxCorners> corners;
-  int size = 0;
-  void add(const Corner& corner) {
-    if (size < kMaxCorners) corners[static_cast<std::size_t>(size++)] = corner;
+template <class Element>
+struct ShortList {
+  std::array<Element, kMaxCorners> elements;
+  std::size_t size = 0;
+  void add(const Element& element) {
+    if (size < kMaxCorners) elements[size++] = element;
   }
+  auto begin() { return elements.begin(); }
+  auto begin() const { return elements.begin(); }
+  auto end() { return elements.begin() + static_cast<std::ptrdiff_t>(size); }
+  auto end() const { return elements.begin() + static_cast<std::ptrdiff_t>(size); }
 };
-
-double apply(const AffineRow& row, const Vec3& p) {
-  return row.x * double{p.x} + row.y * double{p.y} + row.z * double{p.z} + row.w;
-}
-
-Corner transform_corner(const ScreenTransform& t, const Vec3& p) {
-  return {apply(t.x, p), apply(t.y, p), apply(t.z, p), apply(t.w, p), apply(t.near_distance, p)};
-}
-
-bool is_finite(const Vec3& p) {
-  // By the bits, so that it also holds where a compiler was told that there are no NaNs.
-  const auto finite = [](float f) { return (std::bit_cast<std::uint32_t>(f) & 0x7f800000u) != 0x7f800000u; };
-  return finite(p.x) && finite(p.y) && finite(p.z);
-}
-
-bool has_zero_area(const Triangle& t) {
-  const double ux = double{t.b.x} - t.a.x, uy = double{t.b.y} - t.a.y, uz = double{t.b.z} - t.a.z;
-  const double vx = double{t.c.x} - t.a.x, vy = double{t.c.y} - t.a.y, vz = double{t.c.z} - t.a.z;
-  return uy * vz == uz * vy && uz * vx == ux * vz && ux * vy == uy * vx;
-}
+using Polygon = ShortList<Corner>;
+using ScreenPolygon = ShortList<ScreenPoint>;  // convex
 
 /// As a weighted sum, not a + t (b - a): that loses what the outside corner says where the inside one is much
 /// farther away.
@@ -64,9 +45,9 @@ Corner interpolate(const Corner& inside, const Corner& outside, double at_inside
 template <class Distance, class OnPlane>
 Polygon cut(const Polygon& polygon, Distance distance, OnPlane on_plane) {
   Polygon kept;
-  for (int i = 0; i < polygon.size; ++i) {
-    const Corner& from = polygon.corners[static_cast<std::size_t>(i)];
-    const Corner& to = polygon.corners[static_cast<std::size_t>((i + 1) % polygon.size)];
+  for (std::size_t i = 0; i < polygon.size; ++i) {
+    const Corner& from = polygon.elements[i];
+    const Corner& to = polygon.elements[(i + 1) % polygon.size];
     const double at_from = distance(from), at_to = distance(to);
     if (at_from >= 0) kept.add(from);
     if ((at_from >= 0) == (at_to >= 0)) continue;
@@ -88,10 +69,6 @@ Polygon cut_at_near(const Polygon& polygon, const ScreenTransform& t) {
       });
 }
 
-bool beyond_guard_band(const Corner& c) {
-  return std::abs(c.x) > kGuardBand * c.w || std::abs(c.y) > kGuardBand * c.w;
-}
-
 Polygon cut_at_guard_band(Polygon polygon) {
   const auto leave = [](Corner&) {};
   polygon = cut(
@@ -104,37 +81,13 @@ Polygon cut_at_guard_band(Polygon polygon) {
       polygon, [](const Corner& c) { return kGuardBand * c.w - c.y; }, leave);
 }
 
-struct ScreenPoint {
-  double x, y, d;
-};
-
-/// A convex polygon on the screen.
-struct ScreenPolygon {
-  std::array<ScreenPoint, kMaxCorners> points;
-  int size = 0;
-};
-
-ScreenPolygon project(const Polygon& polygon) {
-  ScreenPolygon screen;
-  screen.size = polygon.size;
-  for (std::size_t i = 0; i < static_cast<std::size_t>(polygon.size); ++i) {
-    const Corner& c = polygon.corners[i];
-    // The clamp undoes the last rounding of a corner that was cut to lie on the guard band.
-    screen.points[i] = {std::clamp(c.x / c.w, -kGuardBand, kGuardBand),
-                        std::clamp(c.y / c.w, -kGuardBand, kGuardBand), c.z / c.w};
-  }
-  return screen;
-}
-
 /// Twice the signed area; negative for front faces, since y points down. Of the whole polygon: a corner that
 /// lies on a plane that cuts it is there twice, so that its first three may have none.
-double signed_area2(const ScreenPolygon& p) {
-  const ScreenPoint& a = p.points[0];
+double signed_area2(const ScreenPolygon& polygon) {
+  const auto& p = polygon.elements;
   double sum = 0;
-  for (std::size_t i = 2; i < static_cast<std::size_t>(p.size); ++i) {
-    const ScreenPoint &b = p.points[i - 1], &c = p.points[i];
-    sum += (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
-  }
+  for (std::size_t i = 2; i < polygon.size; ++i)
+    sum += (p[i - 1].x - p[0].x) * (p[i].y - p[0].y) - (p[i - 1].y - p[0].y) * (p[i].x - p[0].x);
   return sum;
 }
 
@@ -145,53 +98,80 @@ ScreenTriangle<Real> piece(const ScreenPoint& a, const ScreenPoint& b, const Scr
   return {{r(a.x), r(b.x), r(c.x)}, {r(a.y), r(b.y), r(c.y)}, {r(a.d), r(b.d), r(c.d)}, id};
 }
 
-/// The way of one triangle through the stage: either counts why it draws nothing and returns false, or fills
-/// `screen`.
-bool to_screen(const Triangle& triangle, const ScreenTransform& transform, const GeometryOptions& options,
-               ScreenPolygon& screen, GeometryCounts& counts) {
-  if (!is_finite(triangle.a) || !is_finite(triangle.b) || !is_finite(triangle.c))
-    return ++counts.non_finite, false;
-  if (has_zero_area(triangle)) return ++counts.zero_area, false;
+/// The way of one triangle through the stage. Every step either goes on or counts why the triangle draws
+/// nothing and returns false; the last one fills `screen`. A triangle that no plane cuts, which is nearly
+/// every one, stays three corners in registers: polygons of any size took twice the time.
+struct Passage {
+  const ScreenTransform& transform;
+  const GeometryOptions& options;
+  GeometryCounts& counts;
+  ScreenPolygon screen = {};
 
-  Polygon polygon;
-  for (const Vec3& p : {triangle.a, triangle.b, triangle.c}) polygon.add(transform_corner(transform, p));
-  const auto any = [&](auto test) {
-    return std::any_of(polygon.corners.begin(), polygon.corners.begin() + polygon.size, test);
-  };
-
-  bool near_clipped = false, guard_clipped = false;
-  if (options.near_rule == NearRule::kClip && any([](const Corner& c) { return c.near_distance < 0; })) {
-    polygon = cut_at_near(polygon, transform);
-    near_clipped = true;
+  bool run(const Triangle& triangle) {
+    const SceneNeeds& needs = options.needs;
+    if (needs.finite_test && !is_finite(triangle)) return ++counts.non_finite, false;
+    if (needs.zero_area_test && has_zero_area(triangle)) return ++counts.zero_area, false;
+    const std::array corners{transform_corner(transform, triangle.a), transform_corner(transform, triangle.b),
+                             transform_corner(transform, triangle.c)};
+    if (reaches_before_near(corners)) return cut_and_finish(corners);
+    if (!lies_between_planes(corners)) return false;
+    if (leaves_guard_band(corners)) return cut_and_finish(corners);
+    return finish(corners, [](const ScreenPoint& p) { return p; });
   }
-  // Without the clip a corner at w <= 0 has no place on the screen; with it, only rounding can leave one.
-  if (polygon.size < 3 || any([](const Corner& c) { return !(c.w > 0); })) return ++counts.behind_near, false;
-  if (!any([&](const Corner& c) { return c.z < transform.far_depth * c.w; }))
-    return ++counts.beyond_far, false;
-  if (any(beyond_guard_band)) {
-    polygon = cut_at_guard_band(polygon);
-    guard_clipped = true;
+
+ private:
+  template <class Corners>
+  bool reaches_before_near(const Corners& corners) const {
+    return options.needs.near_clip && options.near_rule == NearRule::kClip && any(corners, is_before_near);
+  }
+
+  template <class Corners>
+  bool leaves_guard_band(const Corners& corners) const {
+    return options.needs.guard_clip && any(corners, is_beyond_guard_band);
+  }
+
+  template <class Corners>
+  bool lies_between_planes(const Corners& corners) {
+    // Without the clip a corner at w <= 0 has no place on the screen; with it, only rounding can leave one.
+    if (options.needs.behind_reject && any(corners, has_no_place)) return ++counts.behind_near, false;
+    if (options.needs.far_reject &&
+        !any(corners, [&](const Corner& c) { return is_before_far(c, transform); }))
+      return ++counts.beyond_far, false;
+    return true;
+  }
+
+  bool cut_and_finish(const std::array<Corner, 3>& corners) {
+    Polygon polygon;
+    for (const Corner& corner : corners) polygon.add(corner);
+    const bool near_clipped = reaches_before_near(polygon);
+    if (near_clipped) polygon = cut_at_near(polygon, transform);
+    if (polygon.size < 3) return ++counts.behind_near, false;
+    if (!lies_between_planes(polygon)) return false;
+    const bool guard_clipped = leaves_guard_band(polygon);
+    if (guard_clipped) polygon = cut_at_guard_band(polygon);
     if (polygon.size < 3) return ++counts.off_screen, false;
+    // The clamp undoes the last rounding of a corner that was cut to lie on the guard band.
+    const auto onto_band = [](const ScreenPoint& p) {
+      return ScreenPoint{std::clamp(p.x, -kGuardBand, kGuardBand), std::clamp(p.y, -kGuardBand, kGuardBand),
+                         p.d};
+    };
+    if (!finish(polygon, onto_band)) return false;
+    counts.near_clipped += near_clipped;
+    counts.guard_clipped += guard_clipped;
+    return true;
   }
 
-  screen = project(polygon);
-  double low_x = screen.points[0].x, high_x = low_x, low_y = screen.points[0].y, high_y = low_y;
-  for (std::size_t i = 1; i < static_cast<std::size_t>(screen.size); ++i) {
-    low_x = std::min(low_x, screen.points[i].x);
-    high_x = std::max(high_x, screen.points[i].x);
-    low_y = std::min(low_y, screen.points[i].y);
-    high_y = std::max(high_y, screen.points[i].y);
+  template <class Corners, class TouchUp>
+  bool finish(const Corners& corners, TouchUp touch_up) {
+    screen.size = 0;
+    for (const Corner& corner : corners) screen.elements[screen.size++] = touch_up(project(corner));
+    if (options.needs.off_screen_reject && misses_image(screen, transform)) return ++counts.off_screen, false;
+    if (options.cull_back_faces && signed_area2(screen) > 0) return ++counts.back_facing, false;
+    ++counts.drawn;
+    counts.pieces += static_cast<std::int64_t>(screen.size) - 2;
+    return true;
   }
-  if (high_x < 0 || low_x > transform.width || high_y < 0 || low_y > transform.height)
-    return ++counts.off_screen, false;
-  if (options.cull_back_faces && signed_area2(screen) > 0) return ++counts.back_facing, false;
-
-  counts.near_clipped += near_clipped;
-  counts.guard_clipped += guard_clipped;
-  ++counts.drawn;
-  counts.pieces += screen.size - 2;
-  return true;
-}
+};
 
 }  // namespace
 
@@ -249,28 +229,24 @@ void transform_triangles(std::span<const Triangle> triangles, std::int32_t first
                          ScreenTriangle<Real>* slots, std::vector<ScreenTriangle<Real>>& extra,
                          GeometryCounts& counts) {
   counts.triangles += static_cast<std::int64_t>(triangles.size());
-  ScreenPolygon screen;
+  Passage passage{transform, options, counts};
   for (std::size_t i = 0; i < triangles.size(); ++i) {
-    if (!to_screen(triangles[i], transform, options, screen, counts)) {
+    if (!passage.run(triangles[i])) {
       slots[i] = {{}, {}, {}, -1};
       continue;
     }
     const std::int32_t id = first_id + static_cast<std::int32_t>(i);
-    auto& p = screen.points;
-    if (screen.size == 3) {
-      slots[i] = piece<Real>(p[0], p[1], p[2], id);
-      continue;
-    }
-    const auto end = p.begin() + screen.size;
-    std::rotate(p.begin(),
-                std::min_element(p.begin(), end,
-                                 [](const ScreenPoint& a, const ScreenPoint& b) {
-                                   return a.x != b.x ? a.x < b.x : a.y < b.y;
-                                 }),
-                end);
+    ScreenPolygon& polygon = passage.screen;
+    auto& p = polygon.elements;
+    if (polygon.size > 3)
+      std::rotate(polygon.begin(),
+                  std::min_element(polygon.begin(), polygon.end(),
+                                   [](const ScreenPoint& a, const ScreenPoint& b) {
+                                     return a.x != b.x ? a.x < b.x : a.y < b.y;
+                                   }),
+                  polygon.end());
     slots[i] = piece<Real>(p[0], p[1], p[2], id);
-    for (std::size_t k = 3; k < static_cast<std::size_t>(screen.size); ++k)
-      extra.push_back(piece<Real>(p[0], p[k - 1], p[k], id));
+    for (std::size_t k = 3; k < polygon.size; ++k) extra.push_back(piece<Real>(p[0], p[k - 1], p[k], id));
   }
 }
 

@@ -27,10 +27,25 @@ ScreenTransform make_screen_transform(const Camera& camera, DepthFunction functi
 /// How the depth d of the course contract follows from the values of a depth function.
 DepthMap depth_map(const Camera& camera, DepthFunction function);
 
+/// Which of its tests the stage makes. One that fires for no triangle of a scene can be left out; the result
+/// is the same to the bit. See needs.h for how that is known.
+struct SceneNeeds {
+  bool finite_test = true;        ///< some coordinate is not finite
+  bool zero_area_test = true;     ///< some triangle has no area
+  bool near_clip = true;          ///< some triangle reaches in front of the near plane
+  bool behind_reject = true;      ///< some corner may have w <= 0, and so no place on the screen
+  bool far_reject = true;         ///< some triangle may lie wholly beyond the far plane
+  bool guard_clip = true;         ///< some corner may lie outside the guard band
+  bool off_screen_reject = true;  ///< some triangle may miss the image
+
+  bool operator==(const SceneNeeds&) const = default;
+};
+
 /// Choices of the stage.
 struct GeometryOptions {
   NearRule near_rule = NearRule::kClip;
   bool cull_back_faces = false;  ///< back faces occlude by default (accuracy.md, section 1)
+  SceneNeeds needs = {};         ///< all by default, which suits every scene
 };
 
 /// What became of the triangles; the fields before `drawn` count triangles that draw nothing, each once.

@@ -14,8 +14,8 @@
 namespace rasterbench {
 
 /// At the origin, looking along -z, field of view 90 degrees, near 1, far 9: with z = -P.z in front of the
-/// camera, x_px = W/2 (1 + P.x/z), y_px = H/2 (1 - P.y/z), d = 1.25 - 2.25/z. All coefficients are short
-/// binary fractions.
+/// camera, x_px = W/2 (1 + P.x/z), y_px = H/2 (1 - P.y/z), d = 1.25 - 2.25/z; minus reversed z is
+/// 0.125 - 1.125/z. All coefficients are short binary fractions.
 inline Camera plain_camera(int width, int height, Sampling sampling = Sampling::kCentre) {
   return {.x = {1, 0, 0, 0},
           .y = {0, 1, 0, 0},
@@ -23,7 +23,10 @@ inline Camera plain_camera(int width, int height, Sampling sampling = Sampling::
           .w = {0, 0, -1, 0},
           .near_distance = {0, 0, -1, -1},
           .viewport = {width, height, sampling},
-          .near_w = 1};
+          .near_w = 1,
+          .reversed_z = {0, 0, -0.125, -1.125},
+          .near_plane = 1,
+          .far_plane = 9};
 }
 
 inline constexpr int kSide = 8;  ///< of the image of the tests, in pixels

@@ -206,18 +206,27 @@ TEST_P(HandComputed, ShadeTruncatesTheColour) {
   EXPECT_EQ(static_cast<std::uint32_t>(sheet.shade * object.b), sheet.colour[2]);
 }
 
-/// Draws `scene` with every listed kernel in every mode that it has, and calls check(renderer, description).
+/// What a mode's stored depth may differ by from the sheet: these corners are multiples of 1/8 px, which
+/// every mode holds, and no plane of the sheets has a term above one.
+double depth_tolerance(std::string_view mode) {
+  const ModeBound& bound = find_mode(mode)->numbers;
+  return 2e-7 + 0.51 * bound.depth_step + bound.reciprocal_error;
+}
+
+/// Draws `scene` with every listed kernel in every mode that it has, and calls check(renderer, tolerance of
+/// depths).
 template <class Check>
 void with_every_kernel(const Scene& scene, Check check) {
   for (const Kernel& kernel : kernels())
     for (const Kernel::Variant& variant : kernel.variants()) {
       if (kernel.info().hidden || !variant.make) continue;
       for (const FillRule fill : {FillRule::kClosed, FillRule::kTopLeft}) {  // no centre lies on an edge
+        if (fill == FillRule::kTopLeft && !find_mode(variant.mode)->has_screen_triangles) continue;
         const FrameSettings settings{.width = kWidth, .height = kHeight, .fill = fill};
         const auto renderer = variant.make({.scene = &scene, .settings = settings, .execution = {}});
         renderer->draw();
         SCOPED_TRACE(fmt::format("{} {}", kernel.info().name, variant.mode));
-        check(*renderer);
+        check(*renderer, depth_tolerance(variant.mode));
       }
     }
 }
@@ -232,11 +241,11 @@ TEST_P(HandComputed, Frame) {
     colours[index(pixel)] = sheet.colour[0] | sheet.colour[1] << 8 | sheet.colour[2] << 16 | 0xff000000u;
   }
   const Scene scene = sheet.scene();
-  with_every_kernel(scene, [&](const Renderer& renderer) {
+  with_every_kernel(scene, [&](const Renderer& renderer, double tolerance) {
     EXPECT_EQ(renderer.ids(), ids);
     EXPECT_EQ(std::vector(renderer.colours().begin(), renderer.colours().end()), colours);
-    // fixed_8 holds these corners exactly: they are multiples of 1/8 px. What is left is float32's rounding.
-    for (const auto& [pixel, depth] : sheet.depths) EXPECT_NEAR(renderer.depths()[index(pixel)], depth, 2e-7);
+    for (const auto& [pixel, depth] : sheet.depths)
+      EXPECT_NEAR(renderer.depths()[index(pixel)], depth, tolerance);
     for (std::size_t i = 0; i < ids.size(); ++i) EXPECT_EQ(renderer.depths()[i] == 1.0f, ids[i] == -1) << i;
   });
 }
@@ -244,14 +253,15 @@ TEST_P(HandComputed, Frame) {
 TEST_P(HandComputed, ReversedWindingIsBlackWithTheSameCoverage) {
   Scene scene = sheet.scene();
   std::swap(scene.model.triangles[0].b, scene.model.triangles[0].c);
-  with_every_kernel(scene, [&](const Renderer& renderer) {
+  with_every_kernel(scene, [&](const Renderer& renderer, double tolerance) {
     const auto ids = renderer.ids();
     EXPECT_EQ(std::count(ids.begin(), ids.end(), 0), static_cast<std::ptrdiff_t>(sheet.covered.size()));
     for (const Pixel& pixel : sheet.covered) {
       EXPECT_EQ(ids[index(pixel)], 0);
       EXPECT_EQ(renderer.colours()[index(pixel)], 0xff000000u);
     }
-    for (const auto& [pixel, depth] : sheet.depths) EXPECT_NEAR(renderer.depths()[index(pixel)], depth, 2e-7);
+    for (const auto& [pixel, depth] : sheet.depths)
+      EXPECT_NEAR(renderer.depths()[index(pixel)], depth, tolerance);
   });
 }
 
@@ -267,9 +277,10 @@ TEST_P(HandComputed, AHiddenTriangleStaysHidden) {
     Scene scene = sheet.scene();
     const Triangle behind{pushed(s.triangle.a), pushed(s.triangle.b), pushed(s.triangle.c)};
     scene.model.triangles = nearer_first ? std::vector{s.triangle, behind} : std::vector{behind, s.triangle};
-    with_every_kernel(scene, [&](const Renderer& renderer) {
+    with_every_kernel(scene, [&](const Renderer& renderer, double tolerance) {
       for (const Pixel& pixel : s.covered) EXPECT_EQ(renderer.ids()[index(pixel)], nearer_first ? 0 : 1);
-      for (const auto& [pixel, depth] : s.depths) EXPECT_NEAR(renderer.depths()[index(pixel)], depth, 2e-7);
+      for (const auto& [pixel, depth] : s.depths)
+        EXPECT_NEAR(renderer.depths()[index(pixel)], depth, tolerance);
     });
   }
 }

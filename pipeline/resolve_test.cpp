@@ -6,7 +6,7 @@
 #include <array>
 #include <vector>
 
-#include "numeric/modes.h"
+#include "numeric/coverage_testing.h"
 
 namespace rasterbench {
 namespace {
@@ -85,41 +85,64 @@ class ResolveRow : public testing::Test {
   static constexpr std::uint32_t kBackground = rgba(10, 20, 30);
   static constexpr std::uint32_t kOf[3] = {rgba(144, 63, 23), rgba(0, 0, 0), rgba(240, 105, 38)};
 };
-using Modes = testing::Types<F32, F64, Fixed8>;
-TYPED_TEST_SUITE(ResolveRow, Modes);
+TYPED_TEST_SUITE(ResolveRow, ModeTypes, ModeNames);
+
+/// A key of the depth d of the course contract, under the map that gives it back.
+constexpr DepthMap map_of(DepthFunction function) {
+  return function == DepthFunction::kNdc        ? DepthMap{0, 1}
+         : function == DepthFunction::kReversed ? DepthMap{1, 2}
+                                                : DepthMap{2, 1};
+}
+
+template <class Mode>
+typename Mode::Key key_of(float d, std::uint32_t rank) {
+  const DepthMap map = map_of(Mode::kDepthFunction);
+  const double value = (d - map.offset) / map.scale;
+  static const ScreenTriangle<float> any{};
+  if constexpr (std::is_same_v<Mode, ExactMode>)
+    return Mode::key(ExactDepth{value, 0, 0, 0, &any}, rank);
+  else
+    return Mode::key(static_cast<float>(value), rank);
+}
 
 TYPED_TEST(ResolveRow, MapsKeysToColoursAndDepths) {
   const auto clear = TypeParam::kClear;
-  const auto key = [](float depth, std::uint32_t rank) { return TypeParam::key(depth, rank); };
+  const DepthMap map = map_of(TypeParam::kDepthFunction);
   // Runs of one triangle, changes between triangles, and to and from the background.
-  const std::vector keys{clear, key(-1, 0), key(0.25f, 0), key(0.5f, 1),
-                         clear, clear,      key(0.75f, 2), key(0.5f, 0)};
+  const std::vector keys{
+      clear, key_of<TypeParam>(-1, 0),    key_of<TypeParam>(0.25f, 0), key_of<TypeParam>(0.5f, 1), clear,
+      clear, key_of<TypeParam>(0.75f, 2), key_of<TypeParam>(0.5f, 0)};
   const int width = static_cast<int>(keys.size());
   const auto b = TestFixture::kBackground;
   const auto& of = TestFixture::kOf;
   const Scene scene = TestFixture::scene();
   const std::vector<float> depths{1, -1, 0.25f, 0.5f, 1, 1, 0.75f, 0.5f};
+  const auto expect_depths = [&](const std::vector<float>& got) {
+    for (std::size_t i = 0; i < depths.size(); ++i)
+      EXPECT_NEAR(got[i], depths[i], 0.5 * TypeParam::kInfo.numbers.depth_step) << i;
+  };
 
   std::vector<std::uint32_t> colours(keys.size());
   std::vector<float> got_depths(keys.size(), -7.0f);
-  resolve_row<TypeParam>(keys.data(), width, scene, TieRule::kFirst, colours.data(), got_depths.data());
+  resolve_row<TypeParam>(keys.data(), width, scene, TieRule::kFirst, map, colours.data(), got_depths.data());
   EXPECT_EQ(colours, (std::vector<std::uint32_t>{b, of[0], of[0], of[1], b, b, of[2], of[0]}));
-  EXPECT_EQ(got_depths, depths);
+  expect_depths(got_depths);
 
   // The later triangle wins ties: rank r is triangle 2 - r.
-  resolve_row<TypeParam>(keys.data(), width, scene, TieRule::kLast, colours.data(), got_depths.data());
+  resolve_row<TypeParam>(keys.data(), width, scene, TieRule::kLast, map, colours.data(), got_depths.data());
   EXPECT_EQ(colours, (std::vector<std::uint32_t>{b, of[2], of[2], of[1], b, b, of[0], of[2]}));
-  EXPECT_EQ(got_depths, depths);
+  expect_depths(got_depths);
 }
 
 TYPED_TEST(ResolveRow, WritesNoMoreThanItsRow) {
-  const std::array keys{TypeParam::key(0, 1), TypeParam::key(0, 1)};
+  const std::vector keys(2, key_of<TypeParam>(0.5f, 1));
   std::array<std::uint32_t, 2> colours{7, 7};
   std::array<float, 2> depths{7, 7};
-  resolve_row<TypeParam>(keys.data(), 1, TestFixture::scene(), TieRule::kFirst, colours.data(),
-                         depths.data());
+  resolve_row<TypeParam>(keys.data(), 1, TestFixture::scene(), TieRule::kFirst,
+                         map_of(TypeParam::kDepthFunction), colours.data(), depths.data());
   EXPECT_EQ(colours, (std::array<std::uint32_t, 2>{rgba(0, 0, 0), 7}));
-  EXPECT_EQ(depths, (std::array<float, 2>{0, 7}));
+  EXPECT_NEAR(depths[0], 0.5, 0.5 * TypeParam::kInfo.numbers.depth_step);
+  EXPECT_EQ(depths[1], 7);
 }
 
 TYPED_TEST(ResolveRow, ASceneWithoutTrianglesIsBackground) {
@@ -129,7 +152,7 @@ TYPED_TEST(ResolveRow, ASceneWithoutTrianglesIsBackground) {
   for (const TieRule tie : {TieRule::kFirst, TieRule::kLast}) {
     std::array<std::uint32_t, 2> colours{};
     std::array<float, 2> depths{};
-    resolve_row<TypeParam>(keys.data(), 2, empty, tie, colours.data(), depths.data());
+    resolve_row<TypeParam>(keys.data(), 2, empty, tie, {-5, 3}, colours.data(), depths.data());
     EXPECT_EQ(colours, (std::array{TestFixture::kBackground, TestFixture::kBackground}));
     EXPECT_EQ(depths, (std::array{1.0f, 1.0f}));
   }

@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "reference/oracle.h"
@@ -35,22 +34,30 @@ struct Accuracy {
   std::int64_t false_negatives = 0;  ///< background where the oracle has a triangle
   std::int64_t exact_ties = 0;       ///< counts of the classes
   std::int64_t edge = 0, depth = 0, unexplained = 0, unbounded = 0;
-  std::int64_t predicted = 0;          ///< pixels that the mode can get wrong by its bound; -1: unbounded
-  double worst_distance = 0;           ///< largest distance in pixels of a misclassified sample to the edge
-  double max_depth_error_steps = 0;    ///< over pixels of equal id, of d, in steps of 2^-24
-  double max_depth_error_world = 0;    ///< the same in world units along the view axis
-  double silhouette_hausdorff = 0;     ///< Hausdorff distance in pixels between the drawn regions' borders
-  std::int64_t colours_changed = 0;    ///< pixels with a channel that differs
-  std::int64_t colours_changed_8 = 0;  ///< with a channel that differs by more than 8
-  double psnr = 0;                     ///< of the colours, decibels; infinite where they are equal
-  std::int64_t worst_pixel = -1;       ///< index of the wrong pixel farthest from its edge, or of the worst
-                                       ///< depth; -1 where nothing is wrong
-  std::vector<PixelClass> classes;     ///< per pixel
-  bool within_bound() const { return unexplained == 0; }
+  std::int64_t predicted = 0;  ///< pixels that the mode can get wrong by its bound; -1: unbounded
+  /// Largest distance in pixels of a sample to the outline of the triangle that was wrongly drawn there or
+  /// left out; triangles in the wrong order of depth do not count.
+  double worst_distance = 0;
+  double max_depth_error_steps = 0;     ///< over pixels of equal id, of d, in steps of 2^-24
+  double max_depth_error_world = 0;     ///< the same in world units along the view axis
+  std::int64_t depth_out_of_bound = 0;  ///< pixels of equal id whose depth is beyond the bound of the mode
+  double silhouette_hausdorff = 0;      ///< pixels; see silhouette.h
+  std::int64_t colours_changed = 0;     ///< pixels with a channel that differs
+  std::int64_t colours_changed_8 = 0;   ///< with a channel that differs by more than 8
+  double psnr = 0;                      ///< of the colours, decibels; infinite where they are equal
+  /// Index of the wrong pixel farthest from its edge or, where no coverage is wrong, of the largest gap
+  /// between the exact depths of the drawn triangle and the owner; -1 where nothing is wrong. Exact ties come
+  /// last.
+  std::int64_t worst_pixel = -1;
+  std::vector<PixelClass> classes = {};  ///< per pixel
+  bool within_bound() const { return unexplained == 0 && depth_out_of_bound == 0; }
 };
 
-/// Judges `picture`, drawn from `input` in a mode with `bound`; `oracle_colours` is the oracle's picture
-/// shaded. Throws Error if sizes do not match.
+/// Judges `picture`, drawn from `input` in a mode with `bound`; `oracle` is exact_owners(input) and
+/// `oracle_colours` its picture, shaded. A wrong pixel is within the bound if the mode may find there what it
+/// drew: the triangle drawn may cover the sample, at a depth not behind that of any triangle that must. Its
+/// class is kDepth where the depths that the mode may find for the two triangles overlap, and kEdge
+/// otherwise. Throws Error if sizes do not match.
 template <class Real>
 Accuracy measure_accuracy(const JudgedPicture& picture, const OracleInput<Real>& input,
                           const OracleImage& oracle, std::span<const std::uint32_t> oracle_colours,
@@ -61,7 +68,7 @@ Accuracy measure_accuracy(const JudgedPicture& picture, const OracleInput<Real>&
 /// and a legend with counts is drawn below. Returns RGBA8 of width x (height + legend rows).
 struct DifferenceImage {
   int width = 0, height = 0;
-  std::vector<std::uint32_t> pixels;
+  std::vector<std::uint32_t> pixels = {};
 };
 DifferenceImage difference_image(const Accuracy& accuracy, std::span<const std::uint32_t> colours, int width,
                                  int height);

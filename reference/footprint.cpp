@@ -215,8 +215,10 @@ DepthRange depth_on_piece(const Polygon& piece, double x, double y, const ModeBo
     const double y_products = (ad1 + ds) * (ax2 + dr) + (ad2 + ds) * (ax1 + dr);
     const double gx_most = (std::abs(gx * area) + dr * (ad1 + ad2) + ds * (ay1 + ay2 + 2 * dr)) / least;
     const double gy_most = (std::abs(gy * area) + dr * (ad1 + ad2) + ds * (ax1 + ax2 + 2 * dr)) / least;
-    const double gx_error = gradient_error * (x_products + gx_most * products) / least;
-    const double gy_error = gradient_error * (y_products + gy_most * products) / least;
+    const double gx_error =
+        gradient_error * (x_products + gx_most * products) / least + bound.reciprocal_error * gx_most;
+    const double gy_error =
+        gradient_error * (y_products + gy_most * products) / least + bound.reciprocal_error * gy_most;
     const double dx = std::abs(x - a.x) + piece.reach, dy = std::abs(y - a.y) + piece.reach;
     rounding = std::max(rounding, gx_error * dx + gy_error * dy +
                                       plane_error * (std::abs(a.d) + slack + gx_most * dx + gy_most * dy));

@@ -65,6 +65,12 @@ Judge::Screen<Real>& Judge::screen(const ModeInfo& mode) {
   return *slot;
 }
 
+// For with_screen() in other files.
+template OracleInput<float> Judge::input(const ModeInfo&);
+template OracleInput<double> Judge::input(const ModeInfo&);
+template Judge::Screen<float>& Judge::screen(const ModeInfo&);
+template Judge::Screen<double>& Judge::screen(const ModeInfo&);
+
 const OracleImage& Judge::oracle(const ModeInfo& mode) {
   return is_double(mode) ? screen<double>(mode).oracle : screen<float>(mode).oracle;
 }

@@ -3,7 +3,8 @@
 // can therefore get wrong.
 //
 // Shares no arithmetic with any kernel or numeric mode: double with forward error bounds decides almost
-// everything, rationals (GMP through Boost.Multiprecision) the rest.
+// everything, exact products of doubles most of what lies on an edge, and rationals (GMP through
+// Boost.Multiprecision) the rest.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +16,8 @@
 
 namespace rasterbench {
 
-/// What the oracle judges: screen triangles, those with id < 0 drawing nothing. Corners are exact numbers.
+/// What the oracle judges: screen triangles. Corners are exact numbers; what has id < 0, a corner that is not
+/// finite or an area of exactly zero draws nothing.
 template <class Real>
 struct OracleInput {
   std::span<const ScreenTriangle<Real>> triangles;
@@ -26,10 +28,10 @@ struct OracleInput {
   DepthFunction depth_function = DepthFunction::kNdc;
 };
 
-/// What the oracle had to do.
+/// What the oracle had to do. The counts do not depend on the number of threads.
 struct OracleEffort {
   std::int64_t coverage_tests = 0;      ///< edge functions whose sign was asked for
-  std::int64_t coverage_fallbacks = 0;  ///< of those, undecided in double: decided by rationals
+  std::int64_t coverage_fallbacks = 0;  ///< of those, undecided in doubles: decided by rationals
   std::int64_t depth_tests = 0;         ///< comparisons of two depths at a sample
   std::int64_t depth_fallbacks = 0;     ///< of those, decided by rationals
   double seconds = 0;
@@ -44,11 +46,12 @@ struct OracleImage {
   std::vector<double> values;        ///< owner's depth value (of the depth function), within 2^-48 relative
                                      ///< to its corners' largest; far_value() in the background
   /// Distance in pixels from the sample to the nearest edge that could change its owner: the owner's own, or
-  /// that of a triangle that is not behind the owner there by more than kDepthReach. Infinite if there is
-  /// none within a pixel and a half.
+  /// that of a triangle whose depth value there, clamped to its corners', does not exceed the owner's by more
+  /// than kDepthReach. Infinite if there is none within a pixel and a half. Computed in double.
   std::vector<float> edge_margin;
-  /// By how much the depth value of the next covering triangle exceeds the owner's (far_value() counts as
-  /// the background's); 0 = exact tie.
+  /// By how much the depth value of the next covering triangle exceeds the owner's (far_value() counts as the
+  /// background's); 0 = exact tie, positive otherwise. Pieces of the owner's own triangle make no tie. In the
+  /// background: by how much the nearest covering triangle lies beyond far_value(); infinite without any.
   std::vector<float> depth_gap;
   OracleEffort effort;
 
@@ -75,7 +78,8 @@ struct Prediction {
   double max_depth_error = 0;         ///< bound of the depth value's error where the owner is certain
 };
 
-/// `bound.bounded` must be true; snapping, edge form and depth format are taken from it.
+/// `oracle` is exact_owners(input); `bound.bounded` must be true; snapping, edge form and depth format are
+/// taken from it. Throws Error if sizes do not match.
 template <class Real>
 Prediction predict_wrong(const OracleInput<Real>& input, const OracleImage& oracle, const ModeBound& bound,
                          int threads);

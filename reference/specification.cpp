@@ -10,6 +10,7 @@
 #include "numeric/modes.h"
 #include "pipeline/geometry.h"
 #include "pipeline/resolve.h"
+#include "reference/ray_cast_frame.h"
 
 namespace rasterbench {
 namespace {
@@ -78,7 +79,8 @@ Picture render_mode(const Scene& scene, const FrameSettings& settings) {
 }  // namespace
 
 Picture render_specification(const Scene& scene, std::string_view mode, const FrameSettings& settings) {
-  available_mode(mode, "numeric");
+  if (!available_mode(mode, "numeric").has_screen_triangles)
+    return render_ray_cast_specification(scene, settings);
   Picture picture;
   for_each_mode([&]<NumericMode Mode>() {
     if (Mode::kInfo.name == mode) picture = render_mode<Mode>(scene, settings);

@@ -23,7 +23,8 @@ struct Picture {
   std::int64_t samples_covered = 0;  ///< of those, inside: pixels times depth complexity
 };
 
-/// Draws `scene` by the specification of `mode`. Throws InputError for a mode that does not exist.
+/// Draws `scene` by the specification of `mode`. Throws InputError for a mode that does not exist or that
+/// this CPU cannot run, and for settings that the mode does not know.
 Picture render_specification(const Scene& scene, std::string_view mode, const FrameSettings& settings);
 
 /// Pixels whose id, depth bits or colour differ.

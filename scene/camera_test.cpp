@@ -115,6 +115,53 @@ TEST(Camera, NearFarAndTheCornersOfTheFrustum) {
   }
 }
 
+/// -n (f - w) / ((f - n) w) at the distance w of `p` along the view axis, in long double.
+long double reversed_depth(const Vec3d& m, const Vec3d& p, long double n, long double f, bool perspective) {
+  const long double distance = std::hypot(static_cast<long double>(m.x), m.y, m.z);
+  const long double w =
+      distance - (m.x * static_cast<long double>(p.x) + m.y * static_cast<long double>(p.y) +
+                  m.z * static_cast<long double>(p.z)) /
+                     distance;
+  return perspective ? -n * (f - w) / ((f - n) * w) : -(f - w) / (f - n);
+}
+
+TEST(Camera, ReversedDepthIsThatOfLongDouble) {
+  const Viewport viewport{.width = 64, .height = 64};
+  for (const Vec3d& m : kPositions)
+    for (const auto& [n, f] : {std::pair{1.0, 9.0}, {0.1, 1e4}, {1e-9, 1e9}, {3.0, 3.0000001}}) {
+      const Camera c = look_at_origin(m, kRightAngle, n, f, viewport);
+      const Camera flat = orthographic_at_origin(m, 2, n, f, viewport);
+      EXPECT_EQ(c.near_plane, n);
+      EXPECT_EQ(c.far_plane, f);
+      EXPECT_TRUE(c.perspective);
+      EXPECT_EQ(flat.near_plane, n);
+      EXPECT_EQ(flat.far_plane, f);
+      EXPECT_FALSE(flat.perspective);
+      for (const Vec3d& p : {Vec3d{0, 0, 0}, Vec3d{0.3, -0.7, 0.4}, Vec3d{-40, 25, -1e3}}) {
+        const double w = at(c.w, p), size = std::hypot(m.x, m.y, m.z) + std::hypot(p.x, p.y, p.z);
+        if (w < 0.1 * size) continue;  // behind, or where w itself is mostly rounding
+        // The terms of f - w are rounded, and w: each to the size of what it is summed from.
+        const auto expected = static_cast<double>(reversed_depth(m, p, n, f, true));
+        const double tolerance = 1e-14 * (n / (f - n) * (f + size) / w + std::abs(expected) * size / w);
+        EXPECT_NEAR(at(c.reversed_z, p) / w, expected, tolerance) << n << " " << f;
+        EXPECT_NEAR(at(flat.reversed_z, p), static_cast<double>(reversed_depth(m, p, n, f, false)),
+                    1e-14 * (f + size) / (f - n));
+        // And that it is (d - 1) / 2, as far as d has digits left.
+        EXPECT_NEAR(at(c.reversed_z, p) / w, (at(c.z, p) / w - 1) / 2,
+                    tolerance + 1e-14 * ((n + f) * size + 2 * n * f) / (f - n) / w);
+      }
+    }
+}
+
+TEST(Camera, ReversedDepthKeepsWhatDLoses) {
+  // With n = 1e-9 and f = 1e9, what is about 5 away has 1 - d = 4e-10: nine digits are lost beside 1.
+  const Vec3d m{0, 0, 5}, p{0, 0, -0.3};
+  const Camera c = look_at_origin(m, kRightAngle, 1e-9, 1e9, {.width = 64, .height = 64});
+  const auto expected = static_cast<double>(reversed_depth(m, p, 1e-9L, 1e9L, true));
+  EXPECT_NEAR(at(c.reversed_z, p) / at(c.w, p) / expected, 1, 1e-14);
+  EXPECT_GT(std::abs((at(c.z, p) / at(c.w, p) - 1) / 2 / expected - 1), 1e-9);
+}
+
 TEST(Camera, NoAngleMirrorsThePicture) {
   for (const double theta : {1e-300, 1e-6, 3.14159265, std::nextafter(std::numbers::pi, 0.0)}) {
     const Camera c = look_at_origin({1, 2, 3}, theta, 0.1, 10, {.width = 64, .height = 64});

@@ -4,7 +4,6 @@
 
 #include <array>
 #include <bit>
-#include <cstdio>
 #include <string_view>
 
 #include "base/buffer.h"
@@ -22,7 +21,7 @@ constexpr std::uint64_t kHeaderBytes = sizeof(std::int32_t);
 
 }  // namespace
 
-Model read_dat(const std::filesystem::path& path) {
+Model read_dat(const std::filesystem::path& path, std::FILE* warnings) {
   InputFile file(path);
   const std::string name = path.string();
   if (!file.is_regular())
@@ -44,7 +43,7 @@ Model read_dat(const std::filesystem::path& path) {
     throw InputError({.file = name, .byte = 0}, fmt::format("{} ({} bytes)", counts, file.size()));
   const std::uint64_t used = kHeaderBytes + wanted * sizeof(Triangle);
   if (used < file.size())
-    fmt::print(stderr, "warning: {}: {}; the last {} bytes are ignored\n", name, counts, file.size() - used);
+    fmt::print(warnings, "warning: {}: {}; the last {} bytes are ignored\n", name, counts, file.size() - used);
 
   Model model;
   model.name = name;

@@ -2,6 +2,7 @@
 // each triangle.
 #pragma once
 
+#include <cstdio>
 #include <filesystem>
 
 #include "scene/model.h"
@@ -9,8 +10,9 @@
 namespace rasterbench {
 
 /// Reads a .dat file. T is checked against the file's size before anything is allocated. Throws InputError
-/// that names both counts when the file is too short; warns on stderr, naming both, when bytes are left over.
-Model read_dat(const std::filesystem::path& path);
+/// that names both counts when the file is too short; warns on `warnings`, naming both, when bytes are left
+/// over.
+Model read_dat(const std::filesystem::path& path, std::FILE* warnings = stderr);
 
 /// Writes `model` as .dat; write_file's guarantees.
 void write_dat(const Model& model, const std::filesystem::path& path);

@@ -36,8 +36,10 @@ wait_policy = ["default"]
 runtime = ["default"]
 tile = [64]
 cache = ["warm"]
+generality = ["minimal"]
 """
-AXES = ["size", "kernel", "numeric", "fill", "near", "execution", "chunk", "threads", "binding", "wait_policy", "runtime", "tile", "cache"]
+AXES = ["size", "kernel", "numeric", "fill", "near", "execution", "chunk", "threads", "binding", "wait_policy", "runtime", "tile", "cache",
+        "generality"]
 
 
 @pytest.fixture
@@ -102,6 +104,7 @@ def test_the_study_is_good_before_it_is_spoilt(folder: Path) -> None:
     ("tile", "tile = 0", ["tile: "]),
     ("tile", "tile = 16.0", ["tile: "]),
     ("cache", 'cache = "hot"', ["cache: "]),
+    ("generality", 'generality = "ful"', ["generality: ", "full"]),
     ("seed", "seed = -1", ["seed: ", "whole number from 0"]),
     ("seed", "seed = 1.5", ["seed: ", "whole number"]),
     ("target", "target = 0", ["target: ", "a number from"]),

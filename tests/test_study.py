@@ -62,7 +62,8 @@ def mixed(tmp_path_factory: pytest.TempPathFactory) -> Study:
                  sweep("row_parallel", many, threads=1, wait_policy=["active", "passive"]),
                  sweep("row_parallel", many, threads=1, runtime="libomp"),
                  sweep("tile_parallel", "serial", near="off", tile=[16, 32]),
-                 sweep("scanline", "serial", cache=["warm", "cold"]))
+                 sweep("scanline", "serial", cache=["warm", "cold"]),
+                 sweep("bounding_box", "serial", generality=["minimal", "full"]))
 
 
 @pytest.fixture(params=["good", "mixed"])
@@ -76,7 +77,7 @@ NUMBER, TEXT, LIST, WHOLE = (int, float), str, list, int
 NULL = type(None)
 CONFIG = {"scene": TEXT, "scene_hash": TEXT, "size": LIST, "kernel": TEXT, "numeric": TEXT, "fill": TEXT, "near": TEXT, "backend": TEXT,
           "schedule": (TEXT, NULL), "chunk": (WHOLE, NULL), "threads": WHOLE, "binding": TEXT, "wait_policy": TEXT, "runtime": TEXT,
-          "tile": (WHOLE, NULL), "isa": TEXT, "output": TEXT, "cache": TEXT}
+          "tile": (WHOLE, NULL), "isa": TEXT, "output": TEXT, "cache": TEXT, "generality": TEXT}
 RECORD = {"schema": WHOLE, "id": TEXT, "name": TEXT, "config": dict, "status": TEXT, "launches": LIST, "blocks": LIST, "frames_per_sample": WHOLE,
           "samples_ms": LIST, "stages_ms": dict, "median_ms": (*NUMBER, NULL), "interval_ms": (LIST, NULL), "p95_ms": (*NUMBER, NULL),
           "min_ms": (*NUMBER, NULL), "max_ms": (*NUMBER, NULL), "stop": (TEXT, NULL), "verify": (dict, NULL), "work": (dict, NULL),
@@ -125,7 +126,7 @@ def test_config_values(study: Study) -> None:
         schedule = c["backend"] + (f":{c['schedule']}" if c["schedule"] else "") + (f",{c['chunk']}" if c["chunk"] else "")
         parts = [c["scene"], f"{c['size'][0]}x{c['size'][1]}", c["kernel"], c["numeric"], c["fill"], c["near"], schedule, str(c["threads"])]
         for key, label, usual in (("binding", "binding", "none"), ("wait_policy", "wait", "default"), ("runtime", "runtime", "default"),
-                                  ("tile", "tile", 64), ("cache", "cache", "warm")):
+                                  ("tile", "tile", 64), ("cache", "cache", "warm"), ("generality", "generality", "minimal")):
             if c[key] not in (usual, None):
                 parts.append(f"{label}:{c[key]}")
         assert r["name"] == "/".join(parts)
@@ -279,7 +280,7 @@ def test_skipped_with_a_reason(axes: dict[str, Any], words: list[str], mixed: St
 
 
 @pytest.mark.parametrize("axes", [{"binding": "close"}, {"binding": "spread"}, {"wait_policy": "active"}, {"wait_policy": "passive"},
-                                  {"near": "off", "tile": 16}, {"near": "off", "tile": 32}, {"cache": "cold"}, {"threads": 1, "kernel": "row_parallel",
+                                  {"near": "off", "tile": 16}, {"near": "off", "tile": 32}, {"cache": "cold"}, {"generality": "full"}, {"threads": 1, "kernel": "row_parallel",
                                   "binding": "none", "wait_policy": "default", "runtime": "default"}], ids=str)
 def test_axes_that_run(axes: dict[str, Any], mixed: Study) -> None:
     (r,) = [r for r in mixed.where(**axes) if r["config"]["backend"] != "tbb"]

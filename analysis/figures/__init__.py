@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Iterator
 
 from ..comparison import Analysis
-from . import balance, numerics, scaling, scenes, schedules, stages, times
+from . import balance, numerics, pareto, scaling, scenes, schedules, stages, times
 from .common import Drawing
 
-MODULES = (scenes, times, numerics, scaling, schedules, stages, balance)
+MODULES = (scenes, pareto, times, numerics, scaling, schedules, stages, balance)
 
 
 def draw(analysis: Analysis) -> Iterator[Drawing]:

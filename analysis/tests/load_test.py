@@ -68,6 +68,9 @@ def test_malformed_line(study, capsys):
     (lambda r: r.pop("schema"), "schema"),
     (lambda r: r.update(interval_ms=[1]), "interval_ms"),
     (lambda r: r.update(per_thread=[1, 2]), "per_thread"),
+    (lambda r: r["verify"].update(oracle=3), "verify.oracle"),
+    (lambda r: r["verify"]["oracle"].update(wrong="many"), "verify.oracle.wrong"),
+    (lambda r: r["verify"].update(end_to_end={"wrong": -2}), "verify.end_to_end.wrong"),
 ])
 def test_bad_field_is_named(study, capsys, change, field):
     directory = study()

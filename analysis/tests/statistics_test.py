@@ -195,3 +195,32 @@ def test_a_difference_that_all_launches_show_is_found() -> None:
     group = [s.Samples(mean * np.exp(rng.normal(0, 0.01, 25)), launches, blocks) for mean in (10.0, 12.0)]
     best, comparisons = s.compare_with_best(group)
     assert best == 0 and comparisons[1].verdict == "slower"
+
+
+def test_geometric_mean_combines_intervals_as_independent() -> None:
+    a, b = s.Estimate(2.0, 1.8, 2.2, 10, "x"), s.Estimate(8.0, 7.0, 9.0, 12, "x")
+    mean = s.geometric_mean([a, b])
+    assert mean.value == pytest.approx(4.0) and mean.n == 10
+    assert mean.low == pytest.approx(4 * np.exp(-np.hypot(np.log(2 / 1.8), np.log(8 / 7)) / 2))
+    assert mean.high == pytest.approx(4 * np.exp(np.hypot(np.log(2.2 / 2), np.log(9 / 8)) / 2))
+    assert not s.geometric_mean([a, s.Estimate(1.0, None, None, 3, "none")]).has_interval
+    inverse = s.geometric_mean([a.inverse(), b.inverse()])
+    assert (inverse.value, inverse.low, inverse.high) == pytest.approx((1 / mean.value, 1 / mean.high, 1 / mean.low))
+
+
+def test_widened_intervals_grow_with_the_family() -> None:
+    a = s.Estimate(1.2, 1.1, 1.3, 10, "x")
+    assert (s.widened(a, 1).low, s.widened(a, 1).high) == pytest.approx((1.1, 1.3))
+    assert s.widened(a, 300).low < s.widened(a, 10).low < a.low and s.widened(a, 10).high > a.high
+    z = stats.norm.ppf(1 - 0.025 / 10) / stats.norm.ppf(0.975)
+    assert s.widened(a, 10).low == pytest.approx(1.2 * (1.1 / 1.2) ** z)
+
+
+def test_geometric_means_cover_the_truth() -> None:
+    rng = np.random.default_rng(4)
+    covered = 0
+    for _ in range(200):
+        ratios = [s.ratio(samples(2 * rng.lognormal(0, 0.02, 12)), samples(rng.lognormal(0, 0.02, 12))) for _ in range(4)]
+        mean = s.geometric_mean(ratios)
+        covered += mean.low <= 2 <= mean.high
+    assert covered >= 184  # 95 % of 200, and room for chance
