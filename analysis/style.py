@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from dataclasses import dataclass
+from functools import lru_cache
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -61,11 +62,15 @@ def place(figure: Figure, left: float, bottom: float, width: float, height: floa
 
 def text_width(texts: list[str], size: float, bold: bool = False) -> float:
     """Width in inches of the widest text."""
-    font = FontProperties(family="DejaVu Sans", weight="bold" if bold else "normal")
     widest = max(texts, key=len, default="")
     candidates = {t for t in texts if len(t) > 0.8 * len(widest)}
-    return max((TextPath((0, 0), t, size=size, prop=font).get_extents().width for t in candidates if t.strip()),
-               default=0.0) / 72
+    return max((_width(t, size, bold) for t in candidates if t.strip()), default=0.0) / 72
+
+
+@lru_cache(maxsize=None)  # the same names stand in many panels, and outlines are slow to measure
+def _width(words: str, size: float, bold: bool) -> float:
+    font = FontProperties(family="DejaVu Sans", weight="bold" if bold else "normal")
+    return float(TextPath((0, 0), words, size=size, prop=font).get_extents().width)
 
 
 def title(figure: Figure, words: str, top: float = 0.13) -> None:

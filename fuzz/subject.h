@@ -28,7 +28,6 @@ struct Subject {
 /// Draws by the scalar specification of `Mode`: covers, depth, key.
 template <NumericMode Mode>
 ScreenPicture draw_screen(const ScreenInput& input) {
-  using Key = typename Mode::Key;
   const auto triangles = triangles_for<typename Mode::Real>(input, Mode::kDepthFunction);
   const auto width = static_cast<std::size_t>(input.width);
   const std::size_t pixels = width * static_cast<std::size_t>(input.height);
@@ -39,7 +38,8 @@ ScreenPicture draw_screen(const ScreenInput& input) {
                         .counts = std::vector<std::int32_t>(pixels),
                         .tied = std::vector<bool>(pixels)};
   const SampleGrid grid(input.fill, input.width, input.height);
-  std::vector<Key> keys(pixels, Mode::kClear), depths(pixels, Mode::kClear);  // the latter without a rank
+  std::vector<typename Mode::Key> keys(pixels, Mode::kClear);
+  std::vector<decltype(Mode::depth({}, 0, 0))> nearest(pixels);
   for (const auto& triangle : triangles) {
     const auto prepared = Mode::prepare(
         triangle, grid, swap_rank(input.tie, input.ids, static_cast<std::uint32_t>(triangle.id)));
@@ -50,19 +50,23 @@ ScreenPicture draw_screen(const ScreenInput& input) {
         const std::size_t i = static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x);
         ++picture.counts[i];
         const auto depth = Mode::depth(prepared, x, y);
-        const Key key = Mode::key(depth, prepared.rank), without_rank = Mode::key(depth, 0);
-        if (without_rank < depths[i]) {
-          depths[i] = without_rank;
+        const auto key = Mode::key(depth, prepared.rank);
+        if (!(key < Mode::kClear)) continue;  // on the far plane or beyond
+        // Of equal depths either wins with the smaller rank.
+        const bool first = picture.ids[i] < 0;
+        const bool can_win = first || Mode::key(depth, 0) < Mode::key(nearest[i], 1);
+        const bool can_lose = !first && Mode::key(nearest[i], 0) < Mode::key(depth, 1);
+        if (can_win && can_lose && picture.ids[i] != triangle.id) picture.tied[i] = true;
+        if (can_win && !can_lose) {
+          nearest[i] = depth;
           picture.tied[i] = false;
-        } else if (picture.ids[i] >= 0 && picture.ids[i] != triangle.id && !(depths[i] < without_rank)) {
-          picture.tied[i] = true;
         }
         if (!(key < keys[i])) continue;
         keys[i] = key;
         picture.ids[i] = triangle.id;
       }
   }
-  for (const Key& key : keys) picture.values.push_back(Mode::value(key));
+  for (const auto& key : keys) picture.values.push_back(Mode::value(key));
   return picture;
 }
 

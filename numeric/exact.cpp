@@ -1,35 +1,76 @@
 #include "numeric/exact.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <boost/multiprecision/cpp_int.hpp>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 namespace rasterbench {
 namespace {
 
-using Rational = boost::multiprecision::cpp_rational;
+using Integer = boost::multiprecision::cpp_int;
 
-/// The depth as a quotient of two polynomials in the corners: no division until it is compared.
+/// A float32 number as a whole number of units 2^exponent: floats are binary fractions, so that integers do
+/// what rationals would, without their common divisors.
+struct Scaled {
+  std::int64_t mantissa = 0;
+  int exponent = std::numeric_limits<int>::max();  ///< of the last bit that is set; zero has none
+
+  explicit Scaled(float value) {
+    if (value == 0) return;
+    mantissa = static_cast<std::int64_t>(std::ldexp(std::frexp(value, &exponent), kMantissaBits));
+    const int zeros = std::countr_zero(static_cast<std::uint64_t>(mantissa));
+    mantissa /= std::int64_t{1} << zeros;
+    exponent += zeros - kMantissaBits;
+  }
+  Integer in_units_of(int unit) const {
+    return mantissa == 0 ? Integer(0) : Integer(mantissa) << (exponent - unit);
+  }
+
+  static constexpr int kMantissaBits = std::numeric_limits<float>::digits;
+};
+
+/// numerator / denominator * 2^exponent, the denominator positive: no division until it is compared.
 struct Quotient {
-  Rational numerator, denominator;  // denominator > 0
+  Integer numerator, denominator;
+  int exponent;
 };
 
 Quotient exact_depth(const ExactDepth& depth) {
-  if (depth.triangle == nullptr) return {1, 1};
+  if (depth.triangle == nullptr) return {1, 1, 0};
   const ScreenTriangle<float>& t = *depth.triangle;
-  const Rational x = Rational(depth.x) + Rational(1, 2), y = Rational(depth.y) + Rational(1, 2);
-  Rational numerator = 0, denominator = 0;
-  for (int i = 0; i < 3; ++i) {
-    const int j = (i + 1) % 3, k = (i + 2) % 3;
-    // Twice the signed area that corner i's opposite edge spans with the sample: i's share of the sample.
-    const Rational share =
-        (Rational(t.x[j]) - x) * (Rational(t.y[k]) - y) - (Rational(t.x[k]) - x) * (Rational(t.y[j]) - y);
-    numerator += share * Rational(t.d[i]);
-    denominator += share;
+  const std::array x{Scaled(t.x[0]), Scaled(t.x[1]), Scaled(t.x[2])};
+  const std::array y{Scaled(t.y[0]), Scaled(t.y[1]), Scaled(t.y[2])};
+  const std::array d{Scaled(t.d[0]), Scaled(t.d[1]), Scaled(t.d[2])};
+  int unit = -1;  // of coordinates in pixels: samples have halves
+  for (std::size_t i = 0; i < 3; ++i) unit = std::min({unit, x[i].exponent, y[i].exponent});
+  int depth_unit = 0;
+  for (std::size_t i = 0; i < 3; ++i) depth_unit = std::min(depth_unit, d[i].exponent);
+
+  // Corners as seen from the sample.
+  const Integer sample_x = Integer(2 * depth.x + 1) << (-1 - unit);
+  const Integer sample_y = Integer(2 * depth.y + 1) << (-1 - unit);
+  std::array<Integer, 3> dx, dy;
+  for (std::size_t i = 0; i < 3; ++i) {
+    dx[i] = x[i].in_units_of(unit) - sample_x;
+    dy[i] = y[i].in_units_of(unit) - sample_y;
   }
-  if (denominator < 0) return {-numerator, -denominator};
-  return {numerator, denominator};
+  Quotient quotient{0, 0, depth_unit};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
+    // Twice the signed area that corner i's opposite edge spans with the sample: i's share of the sample.
+    const Integer share = dx[j] * dy[k] - dx[k] * dy[j];
+    quotient.numerator += share * d[i].in_units_of(depth_unit);
+    quotient.denominator += share;
+  }
+  if (quotient.denominator < 0) {
+    quotient.numerator = -quotient.numerator;
+    quotient.denominator = -quotient.denominator;
+  }
+  return quotient;
 }
 
 bool same_corners(const ScreenTriangle<float>& a, const ScreenTriangle<float>& b) {
@@ -44,7 +85,10 @@ int compare_exactly(const ExactDepth& a, const ExactDepth& b) {
   if (a.triangle == b.triangle || (a.triangle && b.triangle && same_corners(*a.triangle, *b.triangle)))
     return 0;
   const Quotient p = exact_depth(a), q = exact_depth(b);
-  return Rational(p.numerator * q.denominator).compare(q.numerator * p.denominator);
+  const int unit = std::min(p.exponent, q.exponent);
+  const Integer left = (p.numerator * q.denominator) << (p.exponent - unit);
+  const Integer right = (q.numerator * p.denominator) << (q.exponent - unit);
+  return left.compare(right);
 }
 
 float Exact::depth_error(const ScreenTriangle<float>& t, const Plane::Setup& plane) {

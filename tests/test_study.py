@@ -82,9 +82,17 @@ RECORD = {"schema": WHOLE, "id": TEXT, "name": TEXT, "config": dict, "status": T
           "samples_ms": LIST, "stages_ms": dict, "median_ms": (*NUMBER, NULL), "interval_ms": (LIST, NULL), "p95_ms": (*NUMBER, NULL),
           "min_ms": (*NUMBER, NULL), "max_ms": (*NUMBER, NULL), "stop": (TEXT, NULL), "verify": (dict, NULL), "work": (dict, NULL),
           "threads_observed": (WHOLE, NULL), "per_thread": LIST, "context": TEXT}
-VERIFY = {"conforms": bool, "checked_against": TEXT, "differing_pixels": WHOLE, "oracle": dict, "embree": NULL}
-ORACLE = {"renderer": TEXT, "identical": WHOLE, "edge_ties": WHOLE, "depth_ties": WHOLE, "errors": WHOLE, "max_depth_error_steps": NUMBER,
-          "within_bound": bool}
+VERIFY = {"conforms": bool, "checked_against": TEXT, "differing_pixels": WHOLE, "oracle": (dict, NULL), "end_to_end": dict, "embree": dict,
+          "bound": dict}
+ORACLE = {"renderer": TEXT, "within_bound": bool, "seconds": NUMBER} | dict.fromkeys(
+    ["pixels", "wrong", "false_positives", "false_negatives", "exact_ties", "edge", "depth", "unexplained", "unbounded", "predicted",
+     "colours_changed", "colours_changed_8", "coverage_fallbacks", "depth_fallbacks"], WHOLE) | dict.fromkeys(
+    ["worst_distance_px", "max_depth_error_steps", "max_depth_error_world", "silhouette_hausdorff_px", "psnr_db"], (*NUMBER, NULL))
+END_TO_END = {"renderer": TEXT, "max_depth_error_steps": (*NUMBER, NULL), "seconds": NUMBER} | dict.fromkeys(
+    ["pixels", "identical", "wrong", "ambiguous", "edge_ties", "depth_ties", "unbounded", "errors", "multiprecision_pixels"], WHOLE)
+EMBREE = {"version": TEXT, "robust": bool, "max_depth_difference": (*NUMBER, NULL), "build_ms": NUMBER, "trace_ms": NUMBER} | dict.fromkeys(
+    ["identical", "edge_ties", "depth_ties", "errors"], WHOLE)
+BOUND = {"bounded": bool, "text": TEXT, "source": TEXT}
 WORK = {"triangles": WHOLE, "drawn": WHOLE, "pieces": WHOLE, "rejected": dict, "near_clipped": WHOLE, "guard_clipped": WHOLE,
         "fragments_tested": WHOLE, "fragments_covered": WHOLE, "covered_pixels": WHOLE, "bytes": WHOLE}
 REJECTED = dict.fromkeys(["non_finite", "zero_area", "behind_near", "beyond_far", "off_screen", "back_facing"], WHOLE)
@@ -111,7 +119,12 @@ def test_records_have_the_documented_keys_and_types(study: Study) -> None:
         assert list(r["stages_ms"]) == STAGES
         if r["verify"] is not None:
             obey(r["verify"], VERIFY, r["name"])
-            obey(r["verify"]["oracle"], ORACLE, r["name"])
+            if r["verify"]["oracle"] is not None:
+                obey(r["verify"]["oracle"], ORACLE, r["name"], optional=("wrong_on_snapped", "edge_on_snapped"))
+            obey(r["verify"]["end_to_end"], END_TO_END, r["name"])
+            if "skipped" not in r["verify"]["embree"]:
+                obey(r["verify"]["embree"], EMBREE, r["name"])
+            obey(r["verify"]["bound"], BOUND, r["name"])
             obey(r["work"], WORK, r["name"])
             obey(r["work"]["rejected"], REJECTED, r["name"])
     assert len({r["id"] for r in study.records}) == len({r["name"] for r in study.records}) == len(study.records)
@@ -167,8 +180,13 @@ def test_points_without_a_verdict_show_no_speed(mixed: Study) -> None:
 def test_good_points_are_verified(study: Study) -> None:
     for r in (r for r in study.records if r["status"] == "ok"):
         v, o, w = r["verify"], r["verify"]["oracle"], r["work"]
-        assert v["conforms"] and v["differing_pixels"] == 0 and o["within_bound"] and o["errors"] == 0
-        assert o["identical"] + o["edge_ties"] + o["depth_ties"] == r["config"]["size"][0] * r["config"]["size"][1]
+        pixels = r["config"]["size"][0] * r["config"]["size"][1]
+        assert v["conforms"] and v["differing_pixels"] == 0 and o["within_bound"] and o["unexplained"] == 0
+        assert o["pixels"] == v["end_to_end"]["pixels"] == pixels
+        assert o["wrong"] == o["exact_ties"] + o["edge"] + o["depth"] + o["unbounded"]
+        e = v["end_to_end"]
+        assert e["errors"] == 0 and e["identical"] + e["ambiguous"] + e["wrong"] == pixels
+        assert sum(v["embree"].get(kind, 0) for kind in ("identical", "edge_ties", "depth_ties", "errors")) in (0, pixels)
         assert 0 < w["drawn"] <= w["triangles"] and w["fragments_tested"] >= w["fragments_covered"] >= w["covered_pixels"] > 100 and w["bytes"] > 0
         assert w["drawn"] + sum(w["rejected"].values()) == w["triangles"]
         assert r["threads_observed"] == r["config"]["threads"] == len(r["per_thread"])
