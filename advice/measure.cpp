@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 
 #include "kernels/kernel.h"
 #include "reference/specification.h"
@@ -13,11 +14,17 @@
 namespace rasterbench {
 namespace {
 
-constexpr int kTrialFrames = 3;    // the fastest counts: what disturbs one frame only makes it slower
-constexpr std::size_t kModes = 4;  // that are tried under every kernel and execution
-constexpr std::size_t kFinalists = 4;
-constexpr double kTrialShare = 0.5;  // of the time, for everything before the final rounds
+constexpr int kTrialFrames = 3;       // the fastest counts: what disturbs one frame only makes it slower
+constexpr double kLongTrialMs = 100;  // of frames as long as this, one is enough
+constexpr std::size_t kModes = 4;     // that are tried under every kernel and execution
+constexpr double kTrialShare = 0.5;   // of the time, for everything before the final rounds
+constexpr double kHopeless = 3;  // times the fastest: a kernel's other modes and executions are not tried
+constexpr std::size_t kFinalists = 4;  // at most, and none that was slower than the fastest by more than half
+constexpr double kFinalistShare = 1.5;
 constexpr std::size_t kMostRounds = 100;
+/// Tried first, should the time not suffice for all: the usual winners.
+constexpr std::string_view kFirstKernels[] = {"tile_parallel", "row_parallel", "scanline",
+                                              "triangle_atomics"};
 /// A sample is the mean of as many frames as it takes to be this long: the clock and a stray interrupt weigh
 /// less.
 constexpr double kShortestSampleMs = 5;
@@ -34,14 +41,8 @@ class Bench {
         begin_(std::chrono::steady_clock::now()) {}
 
   Measurements run(std::span<const ModeVerdict> verdicts) {
-    const std::vector<const ModeVerdict*> fastest = fastest_modes(verdicts);
-    for (const Kernel& kernel : kernels()) {
-      if (kernel.info().hidden || kernel.info().tests_every_pixel) continue;
-      for (const ModeVerdict* verdict : fastest)
-        for (const ExecutionConfig& execution : tried_executions(plan_.threads))
-          if (kernel.variant(verdict->mode->name).make)
-            try_in_time({std::string(kernel.info().name), verdict, execution}, kTrialShare);
-    }
+    const std::vector<const ModeVerdict*> modes = fastest_modes(verdicts);
+    for (const std::string& kernel : tried_kernels()) try_kernel(kernel, modes);
     final_rounds();
     return std::move(result_);
   }
@@ -65,6 +66,33 @@ class Bench {
     return modes;
   }
 
+  static std::vector<std::string> tried_kernels() {
+    std::vector<std::string> names(std::begin(kFirstKernels), std::end(kFirstKernels));
+    for (const Kernel& kernel : kernels())
+      if (const std::string name(kernel.info().name);
+          !kernel.info().hidden && !kernel.info().tests_every_pixel &&
+          std::find(names.begin(), names.end(), name) == names.end())
+        names.push_back(name);
+    return names;
+  }
+
+  void try_kernel(const std::string& kernel, std::span<const ModeVerdict* const> modes) {
+    double best = std::numeric_limits<double>::infinity();  // of this kernel
+    for (const ModeVerdict* verdict : modes) {
+      if (!find_kernel(kernel).variant(verdict->mode->name).make) continue;
+      for (const ExecutionConfig& execution : tried_executions(plan_.threads)) {
+        if (std::isfinite(best) && best > kHopeless * conforming().front()->trial_ms) {
+          ++result_.hopeless;
+          continue;
+        }
+        const Candidate candidate{kernel, verdict, execution};
+        try_in_time(candidate, kTrialShare);
+        for (const Measurement* m : conforming())
+          if (m->candidate.kernel == kernel) best = std::min(best, m->trial_ms);
+      }
+    }
+  }
+
   /// Those with a time, the fastest first.
   std::vector<const Measurement*> conforming() const {
     std::vector<const Measurement*> ranked;
@@ -86,7 +114,7 @@ class Bench {
     if (is_known(candidate)) return;
     // The first is always tried: an answer that took too long is worth more than none.
     if (share() >= until && !result_.all.empty()) {
-      ++result_.not_tried;
+      ++result_.no_time;
       return;
     }
     progress_(share(), name_of(candidate));
@@ -100,7 +128,7 @@ class Bench {
     }
     if (!m.conforms) return;
     m.trial_ms = frame_ms(*renderer, 1);
-    for (int frame = 1; frame < kTrialFrames; ++frame)
+    for (int frame = 1; frame < kTrialFrames && m.trial_ms < kLongTrialMs; ++frame)
       m.trial_ms = std::min(m.trial_ms, frame_ms(*renderer, 1));
   }
 

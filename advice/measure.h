@@ -37,7 +37,8 @@ struct MeasuringPlan {
 
 struct Measurements {
   std::vector<Measurement> all;  ///< in the order in which they were tried
-  std::size_t not_tried = 0;     ///< for lack of time
+  std::size_t no_time = 0;       ///< configurations that were left out for lack of time
+  std::size_t hopeless = 0;      ///< left out because their kernel was several times slower than the fastest
 };
 
 /// The executions that are tried: serial for one thread, otherwise loops dealt dynamically, evenly and by

@@ -102,8 +102,10 @@ std::string measured_text(const Advice& a, bool explain) {
   std::string text =
       fmt::format("\nmeasured: {} configurations verified and tried", a.measurements.all.size() - failed);
   if (failed > 0) text += fmt::format(", {} FAILED their verification", failed);
-  if (a.measurements.not_tried > 0)
-    text += fmt::format(", {} left out for lack of time", a.measurements.not_tried);
+  if (a.measurements.no_time > 0)
+    text += fmt::format(", {} left out for lack of time", a.measurements.no_time);
+  if (a.measurements.hopeless > 0)
+    text += fmt::format(", {} left out because their kernel was far behind", a.measurements.hopeless);
   text += "\n";
   for (const Measurement& m : a.measurements.all)
     if (explain || !m.conforms)
@@ -276,7 +278,7 @@ Json advice_json(const Advice& a) {
     tried["trial_ms"] = m.conforms ? Json(m.trial_ms) : Json();
     json["tried"].push_back(std::move(tried));
   }
-  json["not_tried"] = a.measurements.not_tried;
+  json["not_tried"] = {{"no_time", a.measurements.no_time}, {"hopeless", a.measurements.hopeless}};
   json["finalists"] = Json::array();
   json["recommendation"] = nullptr;
   json["nearest"] = nullptr;

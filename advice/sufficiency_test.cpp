@@ -135,7 +135,7 @@ TEST(Measure, RecommendsWhatIsProvedAndVerified) {
   for (const ModeVerdict& v : verdicts) sufficient += v.standing == Standing::kSuffices;
   const Measurements measured =
       measure(scene, settings, verdicts, {.threads = 1, .seconds = 0.5}, [](double, const std::string&) {});
-  EXPECT_GE(measured.all.size() + measured.not_tried, sufficient);
+  EXPECT_GE(measured.all.size() + measured.no_time, sufficient);
   std::size_t finalists = 0;
   for (const Measurement& m : measured.all) {
     EXPECT_TRUE(m.conforms) << name_of(m.candidate);

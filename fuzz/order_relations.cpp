@@ -1,4 +1,7 @@
-// Relations about order: of a triangle's corners, of the triangles, of their ids, and of the two fill rules.
+// Relations about order: of a triangle's corners, of the triangles, of their ids, of the two fill rules, and
+// of depths.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <numeric>
@@ -105,6 +108,31 @@ Verdict fill(const FuzzCase& fuzz_case, const Subject& subject, std::span<const 
       true);
 }
 
+/// Rounding leaves the depths of a triangle's corners unless it is kept from it (accuracy.md, section 1);
+/// tiles could not be rejected by depth. A format of fixed point may round by half a step.
+Verdict range(const FuzzCase& fuzz_case, const Subject& subject, std::span<const std::string>) {
+  ScreenInput input = screen_input(fuzz_case);
+  input.fill = FillRule::kClosed;
+  for (const auto& t : input.triangles) {
+    ScreenInput alone = input;
+    alone.triangles = {t};
+    const ScreenPicture picture = subject.draw(alone);
+    std::array<float, 3> d;
+    std::transform(t.d, t.d + 3, d.begin(),
+                   [&](float v) { return depth_value(v, subject.info.depth_function); });
+    const auto [low, high] = std::minmax_element(d.begin(), d.end());
+    const double room = subject.info.numbers.depth_step / 2 * (1 + 0x1p-20);  // and its own rounding
+    for (std::size_t i = 0; i < picture.ids.size(); ++i)
+      if (picture.ids[i] >= 0 && !(picture.values[i] >= *low - room && picture.values[i] <= *high + room))
+        return judged(
+            fmt::format("pixel ({}, {}) is of depth {:a}, corners are from {:a} to {:a}",
+                        i % static_cast<std::size_t>(picture.width),
+                        i / static_cast<std::size_t>(picture.width), picture.values[i], *low, *high),
+            subject.info.numbers.bounded);
+  }
+  return kHolds;
+}
+
 constexpr Relation kRelations[] = {
     {"turn", "the order and winding of a triangle's corners change nothing", Space::kScreen, turn},
     {"order", "the order in which triangles are drawn changes nothing", Space::kScreen, order},
@@ -112,6 +140,7 @@ constexpr Relation kRelations[] = {
     {"duplicate", "flipped copies of all triangles, with larger ids, change nothing", Space::kScreen,
      duplicate},
     {"fill", "what the rule top-left covers, the rule closed covers", Space::kScreen, fill},
+    {"range", "depths of a triangle stay within those of its corners", Space::kScreen, range},
 };
 
 }  // namespace

@@ -23,6 +23,7 @@ Json oracle_json(const Accuracy& a, const OracleEffort& effort) {
   json["edge"] = a.edge;
   json["depth"] = a.depth;
   json["unexplained"] = a.unexplained;
+  json["depth_out_of_bound"] = a.depth_out_of_bound;
   json["unbounded"] = a.unbounded;
   json["predicted"] = a.predicted;
   json["worst_distance_px"] = finite(a.worst_distance);
@@ -90,9 +91,12 @@ Json judge_picture(Judge& judge, const Picture& picture, const ModeInfo& mode) {
       json["oracle"]["wrong_on_snapped"] = snapped.wrong;
       json["oracle"]["edge_on_snapped"] = snapped.false_positives + snapped.false_negatives + snapped.edge;
     }
-    if (!accuracy.within_bound())
+    if (accuracy.unexplained > 0)
       failure = fmt::format("{} pixels differ from the exact oracle beyond the bound of {}, the worst at {}",
                             accuracy.unexplained, mode.name, place(accuracy.worst_pixel, settings.width));
+    else if (!accuracy.within_bound())
+      failure = fmt::format("{} pixels have a depth beyond the bound of {}", accuracy.depth_out_of_bound,
+                            mode.name);
   } else {
     json["oracle"] = nullptr;
   }

@@ -111,7 +111,7 @@ using Device = std::unique_ptr<std::remove_pointer_t<RTCDevice>, Release>;
 using Hierarchy = std::unique_ptr<std::remove_pointer_t<RTCScene>, Release>;
 
 Device new_device(const std::string& config) {
-  Device device(rtcNewDevice(("ignore_config_files=1," + config).c_str()));
+  Device device(rtcNewDevice(config.c_str()));
   if (!device)
     throw Error(
         fmt::format("Embree cannot be started: error {}", static_cast<int>(rtcGetDeviceError(nullptr))));

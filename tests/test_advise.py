@@ -109,7 +109,7 @@ def test_text(teapot: SmallScene, crossing: SmallScene) -> None:
     for words in ["edges", "depth", "layers", "nothing is promised", "finalists", "recommended: ", "possible by its bound (a proof)",
                   "rasterbench render "]:
         assert words in brief, words
-    assert "near clip" not in brief
+    assert "near clip:" not in brief
     explained = text(crossing, "--explain").stdout
     assert "near clip: kept" in explained and "test of zero area: left out" in explained and "near an edge" in explained
 

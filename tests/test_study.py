@@ -85,7 +85,7 @@ RECORD = {"schema": WHOLE, "id": TEXT, "name": TEXT, "config": dict, "status": T
 VERIFY = {"conforms": bool, "checked_against": TEXT, "differing_pixels": WHOLE, "oracle": (dict, NULL), "end_to_end": dict, "embree": dict,
           "bound": dict}
 ORACLE = {"renderer": TEXT, "within_bound": bool, "seconds": NUMBER} | dict.fromkeys(
-    ["pixels", "wrong", "false_positives", "false_negatives", "exact_ties", "edge", "depth", "unexplained", "unbounded", "predicted",
+    ["pixels", "wrong", "false_positives", "false_negatives", "exact_ties", "edge", "depth", "unexplained", "depth_out_of_bound", "unbounded", "predicted",
      "colours_changed", "colours_changed_8", "coverage_fallbacks", "depth_fallbacks"], WHOLE) | dict.fromkeys(
     ["worst_distance_px", "max_depth_error_steps", "max_depth_error_world", "silhouette_hausdorff_px", "psnr_db"], (*NUMBER, NULL))
 END_TO_END = {"renderer": TEXT, "max_depth_error_steps": (*NUMBER, NULL), "seconds": NUMBER} | dict.fromkeys(
