@@ -67,9 +67,10 @@ std::vector<ConstructionKind> all_kinds() {
   return {
       on_screen("fan",
                 {whole("triangles", 20000, 3, kMostTriangles), real("radius", 1, 0.01, 1e6),
-                 real("rim_w", kFlatW, 0.01, 100)},
+                 real("rim_w", kFlatW, 0.01, 100), real("turn", 0, 0, 7)},
                 [](const GeneratorValues& v, int w, int h) {
-                  return fan(v.integer("triangles"), v.number("radius"), v.number("rim_w"), w, h);
+                  return fan(v.integer("triangles"), v.number("radius"), v.number("rim_w"), v.number("turn"),
+                             w, h);
                 }),
       on_screen("lattice", {whole("cell", 4, 1, 65536)},
                 [](const GeneratorValues& v, int w, int h) {

@@ -36,12 +36,11 @@ std::int64_t drawn_pixels(const std::vector<std::int32_t>& ids) {
   return std::count_if(ids.begin(), ids.end(), [](std::int32_t id) { return id >= 0; });
 }
 
-Finding judge_by_oracle(const DrawnCase& drawn, const Picture& picture) {
+Finding judge_by_oracle(const DrawnCase& drawn, const Picture& picture, const Accuracy& accuracy) {
   Finding finding;
   Judge& judge = drawn.base.judge;
   const ModeInfo& mode = drawn.mode;
   const OracleImage& oracle = judge.oracle(mode);
-  const Accuracy accuracy = judge.against_oracle(picture, mode);
   finding.wrong = accuracy.wrong;
   const auto story = [&](PixelClass of) {
     return against_oracle_text(picture, oracle, first_of_class(accuracy, of));
@@ -84,15 +83,13 @@ Finding judge_by_oracle(const DrawnCase& drawn, const Picture& picture) {
   return finding;
 }
 
-Finding judge_by_truth(const DrawnCase& drawn, const Picture& picture) {
+/// `accuracy`: against the oracle; null for rays.
+Finding judge_by_truth(const DrawnCase& drawn, const Picture& picture, const Accuracy* accuracy) {
   Finding finding;
   Judge& judge = drawn.base.judge;
   const ModeInfo& mode = drawn.mode;
   const Must& must = drawn.one.must;
-  Accuracy accuracy;
-  if (mode.has_screen_triangles) accuracy = judge.against_oracle(picture, mode);
-  const EndToEndVerdict verdict =
-      judge.against_truth(picture, mode, mode.has_screen_triangles ? &accuracy : nullptr);
+  const EndToEndVerdict verdict = judge.against_truth(picture, mode, accuracy);
   finding.wrong = verdict.wrong();
   const std::int64_t drawn_in_truth = drawn_pixels(judge.truth().truth.ids);
   if (verdict.errors > 0) {
@@ -119,6 +116,21 @@ Finding judge_by_truth(const DrawnCase& drawn, const Picture& picture) {
     if (verdict.wrong() > most->second)
       finding.worsen(Verdict::kWrong, share + fmt::format(", {} are allowed", most->second));
   if (verdict.wrong() > 0) finding.worsen(Verdict::kWithinBound, {});
+  return finding;
+}
+
+/// By the oracle and by the truth, as the case asks for. Rays have no screen triangles that an oracle could
+/// be asked about: the truth judges them instead.
+Finding judge_by_exact_answers(const DrawnCase& drawn, const Picture& picture) {
+  const Must& must = drawn.one.must;
+  const bool by_oracle = must.match_oracle || must.pixels;
+  if (!drawn.mode.has_screen_triangles)
+    return by_oracle || must.match_truth ? judge_by_truth(drawn, picture, nullptr) : Finding{};
+  Finding finding;
+  if (!by_oracle && !must.match_truth) return finding;
+  const Accuracy accuracy = drawn.base.judge.against_oracle(picture, drawn.mode);
+  if (by_oracle) finding.merge(judge_by_oracle(drawn, picture, accuracy));
+  if (must.match_truth) finding.merge(judge_by_truth(drawn, picture, &accuracy));
   return finding;
 }
 
@@ -164,7 +176,7 @@ Finding judge_contents(const DrawnCase& drawn, const Picture& picture, const Geo
                                                     {"beyond_far", counts.beyond_far},
                                                     {"off_screen", counts.off_screen}};
   for (const auto& [name, count] : must.counts)
-    if (counted.at(name) != count)
+    if (mode.has_screen_triangles && counted.at(name) != count)
       finding.worsen(Verdict::kWrong,
                      fmt::format("{} is counted as {}, not {}", name, counted.at(name), count));
   if (must.no_background_inside) {
@@ -175,6 +187,10 @@ Finding judge_contents(const DrawnCase& drawn, const Picture& picture, const Geo
 }
 
 }  // namespace
+
+Verdict wrong_in(const ModeInfo& mode) {
+  return mode.numbers.bounded && mode.has_screen_triangles ? Verdict::kWrong : Verdict::kReported;
+}
 
 std::string pixel_name(std::int64_t index, int width) {
   return fmt::format("pixel {},{}", index % width, index / width);
@@ -198,11 +214,13 @@ CaseJudge::CaseJudge(const Case& one, int threads) : one_(one), execution_(defau
 
 Finding CaseJudge::judge(const ModeInfo& mode, std::string_view kernel) {
   Finding finding;
-  if (!find_kernel(kernel).variant(mode.name).make) {
-    finding.verdict = Verdict::kNotCarried;
-    return finding;
-  }
+  finding.verdict = Verdict::kNotCarried;
+  if (!find_kernel(kernel).variant(mode.name).make) return finding;
   for (std::size_t i = 0; i < base_.size(); ++i) {
+    // Rays know neither the top-left rule nor pictures without the near plane.
+    if (!mode.has_screen_triangles &&
+        (one_.fills[i] == FillRule::kTopLeft || one_.near_rule == NearRule::kOff))
+      continue;
     const DrawnCase drawn{one_, *base_[i], changed_.empty() ? nullptr : changed_[i].get(),
                           mode, kernel,    execution_};
     Finding with_fill = judge_drawn(drawn);
@@ -214,42 +232,59 @@ Finding CaseJudge::judge(const ModeInfo& mode, std::string_view kernel) {
   return finding;
 }
 
-Finding CaseJudge::judge_drawn(const DrawnCase& drawn) {
+namespace {
+
+/// A kernel that throws has drawn nothing: as it must be for images that do not fit into memory, said so by
+/// ray casting beyond its limits, and wrong otherwise.
+Finding judge_refusal(const DrawnCase& drawn, const std::string& line) {
   Finding finding;
+  const std::vector<std::string>& parts = drawn.one.must.refusal_or_room;
+  for (const std::string& part : parts)
+    if (line.find(part) == std::string::npos)
+      finding.worsen(Verdict::kWrong, fmt::format("'{}' is not in the error: {}", part, line));
+  finding.worsen(parts.empty() ? wrong_in(drawn.mode) : Verdict::kRefused, "refused: " + line);
+  return finding;
+}
+
+/// A picture in the case's mode, and everything that needs its screen triangles.
+Finding judge_by_specification(const DrawnCase& drawn, const Picture& picture) {
+  Finding finding;
+  const Must& must = drawn.one.must;
+  const JudgedScene& base = drawn.base;
+  const Picture specification = render_specification(base.scene, drawn.mode.name, base.settings);
+  if (const auto differing = differing_pixels(picture, specification); differing > 0)
+    finding.worsen(Verdict::kWrong, fmt::format("{} pixels of {} differ from the specification of {}",
+                                                differing, drawn.kernel, drawn.mode.name));
+  if (must.nothing_tested && specification.samples_tested > 0)
+    finding.worsen(wrong_in(drawn.mode),
+                   fmt::format("{} samples tested for nothing", specification.samples_tested));
+  if (must.every_execution) finding.merge(judge_executions(drawn, specification));
+  return finding;
+}
+
+}  // namespace
+
+Finding CaseJudge::judge_drawn(const DrawnCase& drawn) {
   const Must& must = one_.must;
   const JudgedScene& base = drawn.base;
-  std::unique_ptr<Renderer> renderer;
+  Picture picture;
+  GeometryCounts counts;
   try {
-    renderer = make_renderer(drawn.kernel, drawn.mode.name, {&base.scene, base.settings, execution_});
-  } catch (const InputError& error) {
-    const std::string line = error.what();
-    for (const std::string& part : must.refusal_or_room)
-      if (line.find(part) == std::string::npos)
-        finding.worsen(Verdict::kWrong, fmt::format("'{}' is not in the error: {}", part, line));
-    finding.worsen(must.refusal_or_room.empty() ? Verdict::kWrong : Verdict::kRefused, line);
-    return finding;
+    const auto renderer =
+        make_renderer(drawn.kernel, drawn.mode.name, {&base.scene, base.settings, execution_});
+    if (!must.refusal_or_room.empty()) return {};  // memory suffices: nothing of that size is drawn here
+    counts = renderer->draw().counts;
+    picture = picture_of(*renderer, base.settings);
+  } catch (const Error& error) {
+    return judge_refusal(drawn, error.what());
   }
-  if (!must.refusal_or_room.empty()) return finding;  // memory suffices: nothing of that size is drawn here
 
-  const GeometryCounts counts = renderer->draw().counts;
-  const Picture picture = picture_of(*renderer, base.settings);
+  Finding finding;
   finding.pixels = static_cast<std::int64_t>(picture.ids.size());
   finding.drawn = drawn_pixels(picture.ids);
-  if (drawn.mode.has_screen_triangles) {
-    const Picture specification = render_specification(base.scene, drawn.mode.name, base.settings);
-    if (const auto differing = differing_pixels(picture, specification); differing > 0)
-      finding.worsen(Verdict::kWrong, fmt::format("{} pixels of {} differ from the specification of {}",
-                                                  differing, drawn.kernel, drawn.mode.name));
-    if (must.nothing_tested && specification.samples_tested > 0)
-      finding.worsen(wrong_in(drawn.mode),
-                     fmt::format("{} samples tested for nothing", specification.samples_tested));
-    if (must.match_oracle || must.pixels) finding.merge(judge_by_oracle(drawn, picture));
-    if (must.every_execution) finding.merge(judge_executions(drawn, specification));
-  }
+  if (drawn.mode.has_screen_triangles) finding.merge(judge_by_specification(drawn, picture));
+  finding.merge(judge_by_exact_answers(drawn, picture));
   finding.merge(judge_contents(drawn, picture, counts));
-  // Rays have no screen triangles for the oracle: they are judged by the truth instead.
-  if (must.match_truth || (must.match_oracle && !drawn.mode.has_screen_triangles))
-    finding.merge(judge_by_truth(drawn, picture));
   if (must.match_rays) finding.merge(judge_by_rays(drawn, picture));
   if (drawn.changed) finding.merge(judge_change(drawn, picture));
   return finding;

@@ -70,6 +70,9 @@ Scene open_case(const Case& one);
 /// The fewest threads that show that threads do not matter, and those of this machine.
 ExecutionConfig default_execution(int threads);
 
+/// What a wrong pixel means in a mode: kReported where it promises nothing, or draws by rays.
+Verdict wrong_in(const ModeInfo& mode);
+
 /// "pixel 3,4".
 std::string pixel_name(std::int64_t index, int width);
 

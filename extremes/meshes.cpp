@@ -49,12 +49,13 @@ double random_w(Random& random) { return std::floor(random.uniform(1.25, 8.5) * 
 
 }  // namespace
 
-std::vector<ScreenCorners> fan(std::int64_t triangles, double radius, double rim_w, int width, int height) {
+std::vector<ScreenCorners> fan(std::int64_t triangles, double radius, double rim_w, double turn, int width,
+                               int height) {
   const ScreenCorner hub{width / 2 + 0.5, height / 2 + 0.5, kFlatW};
   const double pixels = radius * std::hypot(width, height);
   const auto rim = [&](std::int64_t i) {
     const double angle =
-        2 * std::numbers::pi * static_cast<double>(i % triangles) / static_cast<double>(triangles);
+        turn + 2 * std::numbers::pi * static_cast<double>(i % triangles) / static_cast<double>(triangles);
     return ScreenCorner{hub.x + pixels * std::cos(angle), hub.y + pixels * std::sin(angle), rim_w};
   };
   std::vector<ScreenCorners> all;

@@ -53,9 +53,8 @@ Finding judge_moved(const DrawnCase& drawn, const Picture& before, const Picture
     }
   if (ties > 0) finding.worsen(Verdict::kWithinBound, {});
   if (errors > 0)
-    finding.worsen(drawn.mode.numbers.bounded ? Verdict::kWrong : Verdict::kReported,
-                   fmt::format("{} pixels differ when {}, {} first", errors, change.name,
-                               pixel_name(first_error, before.width)));
+    finding.worsen(wrong_in(drawn.mode), fmt::format("{} pixels differ when {}, {} first", errors,
+                                                     change.name, pixel_name(first_error, before.width)));
   return finding;
 }
 
@@ -79,7 +78,7 @@ Finding judge_unmoved(const DrawnCase& drawn, const Picture& before, const Pictu
                    fmt::format("{} pixels of a triangle and of its reverse are both lit", lit_twice));
   if (differing > 0)
     finding.worsen(
-        drawn.mode.numbers.bounded ? Verdict::kWrong : Verdict::kReported,
+        wrong_in(drawn.mode),
         fmt::format("{} pixels differ when {}, {} first: triangle {} at {:.9g}, then {} at {:.9g}", differing,
                     change, pixel_name(first, before.width), before.ids[static_cast<std::size_t>(first)],
                     before.values[static_cast<std::size_t>(first)],

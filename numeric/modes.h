@@ -349,7 +349,7 @@ inline constexpr ModeInfo kRayCastInfo{
     .name = "ray_cast",
     .vertices = "float32 world coordinates",
     .edges = "Embree's ray-triangle test, float32, one ray per sample (fill rule: closed)",
-    .depth = "float32 d of the hit",
+    .depth = "float64 on the triangle's plane, rounded once to float32",
     .bound = "wrong only at edges and near ties in depth, within a bound per pixel",
     .bound_source = "forward error of float32 rays (reference/ray_comparison.cpp)",
     .numbers = {},
