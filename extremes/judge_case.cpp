@@ -11,9 +11,6 @@
 namespace rasterbench::extremes {
 namespace {
 
-/// What a wrong pixel means in this mode.
-Verdict wrong_in(const ModeInfo& mode) { return mode.numbers.bounded ? Verdict::kWrong : Verdict::kReported; }
-
 bool is_exact_in_coverage(const ModeInfo& mode) {
   return mode.numbers.edge_form == EdgeForm::kExact && mode.numbers.snap == 0;
 }
@@ -110,7 +107,7 @@ Finding judge_by_truth(const DrawnCase& drawn, const Picture& picture, const Acc
     const bool must_survive =
         std::find(must.survivors.begin(), must.survivors.end(), mode.name) != must.survivors.end();
     finding.worsen(must_survive ? Verdict::kWrong : Verdict::kReported,
-                   share + (must_survive ? ": this mode must survive" : ": lost to the rounding of corners"));
+                   share + (must_survive ? ": this mode must survive" : ": lost to rounding"));
   }
   if (const auto most = must.wrong_at_most.find(std::string(mode.name)); most != must.wrong_at_most.end())
     if (verdict.wrong() > most->second)
@@ -196,11 +193,7 @@ std::string pixel_name(std::int64_t index, int width) {
   return fmt::format("pixel {},{}", index % width, index / width);
 }
 
-ExecutionConfig default_execution(int threads) {
-  return {.backend = "openmp", .schedule = "dynamic", .chunk = {}, .threads = threads};
-}
-
-CaseJudge::CaseJudge(const Case& one, int threads) : one_(one), execution_(default_execution(threads)) {
+CaseJudge::CaseJudge(const Case& one, int threads) : one_(one) {
   const Scene scene = open_case(one_);
   for (const FillRule fill : one_.fills) {
     FrameSettings settings{.width = scene.parameters.width, .height = scene.parameters.height, .fill = fill};
@@ -221,8 +214,7 @@ Finding CaseJudge::judge(const ModeInfo& mode, std::string_view kernel) {
     if (!mode.has_screen_triangles &&
         (one_.fills[i] == FillRule::kTopLeft || one_.near_rule == NearRule::kOff))
       continue;
-    const DrawnCase drawn{one_, *base_[i], changed_.empty() ? nullptr : changed_[i].get(),
-                          mode, kernel,    execution_};
+    const DrawnCase drawn{one_, *base_[i], changed_.empty() ? nullptr : changed_[i].get(), mode, kernel};
     Finding with_fill = judge_drawn(drawn);
     if (!with_fill.explanation.empty())
       with_fill.explanation =
@@ -270,8 +262,7 @@ Finding CaseJudge::judge_drawn(const DrawnCase& drawn) {
   Picture picture;
   GeometryCounts counts;
   try {
-    const auto renderer =
-        make_renderer(drawn.kernel, drawn.mode.name, {&base.scene, base.settings, execution_});
+    const auto renderer = make_renderer(drawn.kernel, drawn.mode.name, {&base.scene, base.settings, {}});
     if (!must.refusal_or_room.empty()) return {};  // memory suffices: nothing of that size is drawn here
     counts = renderer->draw().counts;
     picture = picture_of(*renderer, base.settings);

@@ -23,20 +23,20 @@ struct JudgedScene {
   Judge judge;
 };
 
-/// What a case draws, and draws again.
+/// What a case draws, and draws again. Serially, unless the case is about threads: the pictures are so small
+/// that threads would cost more than they save.
 struct DrawnCase {
   const Case& one;
   JudgedScene& base;
   JudgedScene* changed;  ///< of Must::same_as, or null
   const ModeInfo& mode;
   std::string_view kernel;
-  ExecutionConfig execution;
 };
 
 /// Judges one case in many modes and kernels; keeps what the judges need.
 class CaseJudge {
  public:
-  /// `threads` for drawing and judging. Throws InputError where the scene cannot be made.
+  /// `threads` for the judges. Throws InputError where the scene cannot be made.
   CaseJudge(const Case& one, int threads);
 
   /// The verdict for a mode that this CPU can run. kNotCarried where the kernel does not suit it. Watertight
@@ -47,7 +47,6 @@ class CaseJudge {
   Finding judge_drawn(const DrawnCase& drawn);
 
   Case one_;
-  ExecutionConfig execution_;
   std::vector<std::unique_ptr<JudgedScene>> base_, changed_;  // by fill rule
 };
 
@@ -66,9 +65,6 @@ Finding judge_reading(const Case& one);
 
 /// The scene of a case, read through a file where it is given as one.
 Scene open_case(const Case& one);
-
-/// The fewest threads that show that threads do not matter, and those of this machine.
-ExecutionConfig default_execution(int threads);
 
 /// What a wrong pixel means in a mode: kReported where it promises nothing, or draws by rays.
 Verdict wrong_in(const ModeInfo& mode);

@@ -11,9 +11,11 @@ namespace rasterbench::extremes {
 /// The depth w of flat meshes: far from the near and the far plane, and a power of two.
 inline constexpr double kFlatW = 2;
 
-/// A fan about the sample of the middle pixel, its rim `radius` image diagonals away and at depth rim_w: with
-/// a radius of 1 and more, every sample lies in exactly one triangle, or on an edge, or on the hub.
-std::vector<ScreenCorners> fan(std::int64_t triangles, double radius, double rim_w, int width, int height);
+/// A fan about the sample of the middle pixel, its rim `radius` image diagonals away and at depth rim_w, from
+/// the angle `turn` (radians) on: with a radius of 1 and more, every sample lies in exactly one triangle, or
+/// on an edge, or on the hub.
+std::vector<ScreenCorners> fan(std::int64_t triangles, double radius, double rim_w, double turn, int width,
+                               int height);
 
 /// Squares of `cell` pixels with their corners on samples, each cut along one of its diagonals in turn,
 /// beyond the image on all sides.

@@ -162,8 +162,7 @@ std::vector<SweepPoint> measure(const Sweep& sweep, double value, std::span<cons
   std::vector<SweepPoint> points;
   for (const std::string_view name : modes) {
     const ModeInfo& mode = *find_mode(name);
-    const auto renderer =
-        make_renderer("tile_parallel", name, {&scene, settings, default_execution(threads)});
+    const auto renderer = make_renderer("tile_parallel", name, {&scene, settings, {}});
     renderer->draw();
     const Picture picture = picture_of(*renderer, settings);
     points.push_back(sweep.by_truth ? by_truth(judge, picture, mode) : by_oracle(judge, picture, mode));

@@ -4,7 +4,7 @@
 #include <bit>
 
 #include "base/buffer.h"
-#include "extremes/judge_case.h"
+#include "execution/execution.h"
 #include "pipeline/geometry.h"
 
 namespace rasterbench::extremes {
@@ -81,7 +81,7 @@ std::vector<WatertightCount> count_gaps_and_overlaps(const Scene& scene,
   const auto in_double = screen_triangles<double>(scene);
   std::vector<Coverage> coverages(static_cast<std::size_t>(threads), Coverage(pixels));
   std::vector<WatertightCount> counts(modes.size());
-  make_execution(default_execution(threads))
+  make_execution({.backend = "openmp", .schedule = "dynamic", .chunk = {}, .threads = threads})
       ->loop(static_cast<std::int64_t>(modes.size()), [&](std::int64_t i, int worker) {
         const auto index = static_cast<std::size_t>(i);
         Coverage& coverage = coverages[static_cast<std::size_t>(worker)];

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cctype>
 #include <chrono>
+#include <limits>
 
 #include "fuzz/generate.h"
 #include "fuzz/shrink.h"
@@ -15,6 +16,11 @@ namespace {
 /// A case in the world is dear: it comes once in so many, and a few of the modes are asked.
 constexpr std::int64_t kWorldEvery = 16;
 constexpr std::size_t kModesOfAWorldCase = 4;
+
+Space space_of(std::int64_t number) {
+  return number % kWorldEvery == kWorldEvery - 1 ? Space::kWorld : Space::kScreen;
+}
+
 /// What shrinking one finding may cost, in questions to its relation.
 constexpr int kQuestionsOnTheScreen = 4000, kQuestionsInTheWorld = 600;
 
@@ -24,11 +30,9 @@ class Fuzzer {
       : options_(options), listener_(listener), begin_(std::chrono::steady_clock::now()) {}
 
   FuzzReport run() {
-    const bool in_world = has_relation(Space::kWorld), on_screen = has_relation(Space::kScreen);
-    while (!is_stopped() && (options_.cases < 0 || report_.cases < options_.cases) &&
-           seconds() < options_.seconds) {
-      const bool world = in_world && (!on_screen || report_.cases % kWorldEvery == kWorldEvery - 1);
-      try_case(make_case(options_.seed, report_.cases, world ? Space::kWorld : Space::kScreen));
+    for (number_ = options_.first; !is_stopped() && !is_at_limit(); ++number_) {
+      if (!has_relation(space_of(number_))) continue;
+      try_case(make_case(options_.seed, number_, space_of(number_)));
       ++report_.cases;
       report_.seconds = seconds();
       if (listener_.progress) listener_.progress(report_);
@@ -40,6 +44,11 @@ class Fuzzer {
  private:
   double seconds() const {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+  }
+
+  bool is_at_limit() const {
+    return (options_.cases >= 0 && report_.cases >= options_.cases) || seconds() >= options_.seconds ||
+           number_ == std::numeric_limits<std::int64_t>::max();
   }
 
   bool has_relation(Space space) const {
@@ -57,7 +66,7 @@ class Fuzzer {
     std::vector<const Subject*> modes;
     for (const Subject& mode : options_.modes) modes.push_back(&mode);
     if (fuzz_case.space == Space::kScreen || modes.size() <= kModesOfAWorldCase) return modes;
-    Random random(options_.seed ^ static_cast<std::uint64_t>(report_.cases));
+    Random random(options_.seed ^ static_cast<std::uint64_t>(number_));
     for (std::size_t i = 0; i < kModesOfAWorldCase; ++i)
       std::swap(modes[i], modes[i + random.bits() % (modes.size() - i)]);
     modes.resize(kModesOfAWorldCase);
@@ -74,6 +83,7 @@ class Fuzzer {
   }
 
   void ask(const Relation& relation, const Subject& mode, const FuzzCase& fuzz_case) {
+    if (listener_.asking) listener_.asking(number_, relation, mode);
     Tally& tally = report_.tallies[relation.name];
     const Verdict verdict = check(relation, mode, fuzz_case, options_.kernels);
     ++tally.asked;
@@ -96,7 +106,7 @@ class Fuzzer {
           return !is_stopped() && check(relation, mode, smaller, options_.kernels).violated();
         },
         on_screen ? kQuestionsOnTheScreen : kQuestionsInTheWorld);
-    report_.findings.push_back({&relation, std::string(mode.info.name), report_.cases, fuzz_case, minimal,
+    report_.findings.push_back({&relation, std::string(mode.info.name), number_, fuzz_case, minimal,
                                 check(relation, mode, minimal, options_.kernels).what});
     if (listener_.found) listener_.found(report_.findings.back());
   }
@@ -104,6 +114,7 @@ class Fuzzer {
   const FuzzOptions& options_;
   const FuzzListener& listener_;
   std::chrono::steady_clock::time_point begin_;
+  std::int64_t number_ = 0;  // of the case
   FuzzReport report_;
 };
 

@@ -14,6 +14,7 @@ namespace rasterbench::fuzz {
 
 struct FuzzOptions {
   std::uint64_t seed = 1;
+  std::int64_t first = 0;   ///< number of the first case
   double seconds = 10;      ///< after which no new case is begun
   std::int64_t cases = -1;  ///< after which it ends as well; negative: no such limit
   std::vector<Subject> modes = {};
@@ -45,14 +46,17 @@ struct FuzzReport {
   std::map<std::string_view, Tally> tallies;  ///< by relation
 };
 
-/// What is told while it runs; each may be empty. `stop` is asked between two questions to a relation.
+/// What is told while it runs; each may be empty. `stop` is asked between two questions to a relation, and
+/// `asking` is told before each: who listens can say what a crash was about.
 struct FuzzListener {
+  std::function<void(std::int64_t case_number, const Relation&, const Subject&)> asking = {};
   std::function<void(const FuzzReport&)> progress = {};
   std::function<void(const Finding&)> found = {};
   std::function<bool()> stop = {};
 };
 
-/// The sequence of cases follows from the seed and the relations alone: a limit only ends it.
+/// Case number i of a seed is the same whatever was asked before; cases in a space that no relation is about
+/// are left out.
 FuzzReport run_fuzz(const FuzzOptions& options, const FuzzListener& listener = {});
 
 /// A name that says what was found and where: "TurnF32FmaSeed1Case42".

@@ -146,9 +146,13 @@ class Story {
         owner = triangle.id;
       }
       auto& claims = claims_[piece];
-      if (claims.empty()) {
+      // Modes of float64 vertices are given other corners, hence another truth.
+      const std::string exact = std::is_same_v<typename Mode::Real, double> ? "exact, float64" : "exact";
+      if (std::none_of(claims.begin(), claims.end(), [&](const Claim& c) { return c.arithmetic == exact; })) {
         claims.push_back(exact_claim(triangle, x_, y_, settings.fill));
+        claims.back().arithmetic = exact;
         claims.back().depth = map.offset + map.scale * claims.back().depth;
+        if (claims.back().covers) wanted_.insert(piece);
         corners_[piece] =
             fmt::format("({:.9g}, {:.9g}, d {:.9g}) ({:.9g}, {:.9g}, d {:.9g}) ({:.9g}, {:.9g}, d {:.9g}) px",
                         triangle.x[0], triangle.y[0], map.offset + map.scale * triangle.d[0], triangle.x[1],
@@ -156,14 +160,14 @@ class Story {
                         map.offset + map.scale * triangle.d[2]);
       }
       claims.push_back(claim);
-      if (claim.covers || claims.front().covers) wanted_.insert(piece);
+      if (claim.covers) wanted_.insert(piece);
     }
     owners_[name] = owner;
   }
 
   Judge& judge_;
   int x_, y_;
-  std::map<Piece, std::vector<Claim>> claims_;  // the first one exact
+  std::map<Piece, std::vector<Claim>> claims_;
   std::map<Piece, std::string> corners_;
   std::set<Piece> wanted_;
   std::map<std::string, std::int32_t> owners_;

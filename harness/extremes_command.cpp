@@ -226,6 +226,9 @@ int run_extremes(ExtremesOptions options) {
   for (const std::string& name : options.numerics) modes.push_back(available_mode(name, "--numeric").name);
   if (modes.empty()) modes = extremes::runnable_modes(kernels);
   if (options.threads == 0) options.threads = default_threads();
+  if (options.threads > available_cpus())
+    throw InputError({.field = "--threads"},
+                     fmt::format("at most the {} CPUs of this process", available_cpus()));
   const std::vector<Case> cases = chosen_cases(options);
 
   std::vector<Results> all;

@@ -1,6 +1,10 @@
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <csignal>
+#include <cstring>
 #include <filesystem>
 
 #include "base/error.h"
@@ -17,6 +21,30 @@ namespace {
 
 /// As a shell says of a command that Ctrl-C has ended: 128 + SIGINT.
 constexpr int kInterruptedExitCode = 130;
+
+/// What is being asked: of use to whoever reads of a crash in it.
+std::array<char, 256> asked_last{};
+
+/// A crash ends the process as it would have, after one line that says how to see it again.
+void catch_crashes() {
+  const auto handler = [](int signal) {
+    // Only what a handler may call.
+    [[maybe_unused]] const auto written =
+        write(STDERR_FILENO, asked_last.data(), std::strlen(asked_last.data()));
+    std::signal(signal, SIG_DFL);
+    raise(signal);
+  };
+  for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) std::signal(signal, handler);
+}
+
+void remember(std::uint64_t seed, std::int64_t number, const fuzz::Relation& relation,
+              const fuzz::Subject& mode) {
+  const auto end = fmt::format_to_n(
+      asked_last.data(), asked_last.size() - 1,
+      "\nrasterbench: crashed in: fuzz --seed {} --first {} --cases 1 --relation {} --numeric {}\n", seed,
+      number, relation.name, mode.info.name);
+  *end.out = '\0';
+}
 
 struct FuzzArguments {
   fuzz::FuzzOptions options;
@@ -75,8 +103,12 @@ int fuzz_and_report(FuzzArguments& a) {
   complete(a);
   if (!a.out.empty()) make_folder(a.out);
   catch_interrupts();
+  catch_crashes();
   Progress progress;
   fuzz::FuzzListener listener;
+  listener.asking = [&](std::int64_t number, const fuzz::Relation& relation, const fuzz::Subject& mode) {
+    remember(a.options.seed, number, relation, mode);
+  };
   listener.stop = [] { return interrupted.load(); };
   listener.progress = [&](const fuzz::FuzzReport& report) {
     const double share = std::max(
@@ -109,6 +141,9 @@ void add_fuzz_command(CLI::App& app, Outcome& outcome) {
       ->check(CLI::NonNegativeNumber);
   command->add_option("--cases", a->options.cases, "end after so many cases as well (default: no such limit)")
       ->check(CLI::Range(std::int64_t{1}, std::numeric_limits<std::int64_t>::max()));
+  command->add_option("--first", a->options.first, "number of the first case")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber);
   command->add_option("--seed", a->options.seed, "of the sequence of cases; the same seed, the same cases")
       ->capture_default_str()
       ->check(CLI::NonNegativeNumber);

@@ -1,6 +1,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
 #include <new>
 
 #include "base/error.h"
@@ -19,7 +22,11 @@ int report(const char* program, std::string message, int exit_code) {
 
 int guarded_main(const char* program, const std::function<int()>& body) {
   try {
-    return body();
+    const int exit_code = body();
+    // A full disk under a redirected stdout shows only here.
+    if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
+      throw Error(std::string("stdout cannot be written: ") + std::strerror(errno));
+    return exit_code;
   } catch (const Error& error) {
     return report(program, error.what(), error.exit_code());
   } catch (const std::bad_alloc&) {

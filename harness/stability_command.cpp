@@ -101,6 +101,9 @@ void run_stability(const StabilityOptions& options) {
   const std::vector<Sweep> sweeps = chosen_sweeps(options.sweeps);
   const std::vector<std::string_view> modes = chosen_modes(options.numerics);
   const int threads = options.threads > 0 ? options.threads : default_threads();
+  if (threads > available_cpus())
+    throw InputError({.field = "--threads"},
+                     fmt::format("at most the {} CPUs of this process", available_cpus()));
   std::string lines;
   BreakingPoints breaking;
   {

@@ -86,17 +86,22 @@ Json judge_picture(Judge& judge, const Picture& picture, const ModeInfo& mode) {
   if (mode.has_screen_triangles) {
     accuracy = judge.against_oracle(picture, mode);
     json["oracle"] = oracle_json(accuracy, judge.oracle(mode).effort);
-    if (mode.numbers.snap > 0) {
-      const Accuracy snapped = judge.against_snapped_oracle(picture, mode);
-      json["oracle"]["wrong_on_snapped"] = snapped.wrong;
-      json["oracle"]["edge_on_snapped"] = snapped.false_positives + snapped.false_negatives + snapped.edge;
-    }
     if (accuracy.unexplained > 0)
       failure = fmt::format("{} pixels differ from the exact oracle beyond the bound of {}, the worst at {}",
                             accuracy.unexplained, mode.name, place(accuracy.worst_pixel, settings.width));
     else if (!accuracy.within_bound())
       failure = fmt::format("{} pixels have a depth beyond the bound of {}", accuracy.depth_out_of_bound,
                             mode.name);
+    if (mode.numbers.snap > 0) {
+      const Accuracy snapped = judge.against_snapped_oracle(picture, mode);
+      json["oracle"]["wrong_on_snapped"] = snapped.wrong;
+      json["oracle"]["edge_on_snapped"] = snapped.edge + snapped.unexplained;
+      if (failure.empty() && snapped.edge + snapped.unexplained > 0)
+        failure = fmt::format(
+            "{} pixels differ from the exact oracle on the snapped vertices of {}, which it "
+            "promises to draw exactly",
+            snapped.edge + snapped.unexplained, mode.name);
+    }
   } else {
     json["oracle"] = nullptr;
   }

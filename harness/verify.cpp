@@ -39,6 +39,24 @@ std::string picture_hash(const Renderer& renderer) {
   return hash_bytes(hash_bytes(bytes(renderer.colours())) + hash_bytes(bytes(renderer.depths())));
 }
 
+Conformance check_conformance(const std::string& kernel, const std::string& mode, RendererSetup setup,
+                              const Picture& specification) {
+  constexpr std::uint64_t kPermutationSeed = 0x5eed;
+  Conformance result;
+  for (const std::uint64_t seed : {kPermutationSeed, std::uint64_t{0}}) {
+    setup.permutation_seed = seed;
+    const auto renderer = make_renderer(kernel, mode, setup);
+    for (int frame = 0; frame < 2; ++frame) {
+      result.report = renderer->draw();
+      result.differing =
+          std::max(result.differing, differing_pixels(picture_of(*renderer, setup.settings), specification));
+    }
+    result.bytes = renderer->bytes();
+    result.picture = picture_hash(*renderer);
+  }
+  return result;
+}
+
 Judge& Verifier::judge_of(const Point& point, const Scene& scene) {
   constexpr std::size_t kKept = 2;  // a study varies the fill rule within a mode; more would only cost memory
   Point relevant = point;
@@ -65,7 +83,6 @@ const Verifier::Expected& Verifier::expected(const Point& point, const Scene& sc
 }
 
 Json Verifier::judge(const Point& point, const Scene& scene) {
-  constexpr std::uint64_t kPermutationSeed = 0x5eed;
   const FrameSettings settings = point.settings();
   const Expected& expect = expected(point, scene);
   Json answer;
@@ -81,31 +98,21 @@ Json Verifier::judge(const Point& point, const Scene& scene) {
       answer["failure"] = "a worker flushes denormals (MXCSR): the mode's bits are not defined";
   }
 
-  Picture drawn;
-  FrameReport report;
-  std::int64_t differing = 0;
-  for (const std::uint64_t seed : {kPermutationSeed, std::uint64_t{0}}) {
-    const auto renderer =
-        make_renderer(point.kernel, point.numeric, {&scene, settings, point.execution, seed});
-    // The second frame meets what the first left in the strategy's memory, as every timed frame does.
-    for (int frame = 0; frame < 2; ++frame) {
-      report = renderer->draw();
-      drawn = picture_of(*renderer, settings);
-      differing = std::max(differing, differing_pixels(drawn, expect.specification));
-    }
-    answer["frame_ms"] = report.seconds.total() * 1e3;
-    answer["work"] = work_json(report.counts, expect.specification, renderer->bytes());
-    answer["picture"] = picture_hash(*renderer);
-  }
+  const Conformance drawn = check_conformance(
+      point.kernel, point.numeric, {.scene = &scene, .settings = settings, .execution = point.execution},
+      expect.specification);
+  answer["frame_ms"] = drawn.report.seconds.total() * 1e3;
+  answer["work"] = work_json(drawn.report.counts, expect.specification, drawn.bytes);
+  answer["picture"] = drawn.picture;
 
   Json& verify = answer["verify"];
-  verify["conforms"] = differing == 0;
+  verify["conforms"] = drawn.differing == 0;
   verify["checked_against"] = "scalar specification of the mode; screen triangles in order and permuted";
-  verify["differing_pixels"] = differing;
+  verify["differing_pixels"] = drawn.differing;
   for (const char* verdict : {"oracle", "end_to_end", "embree", "bound"})
     verify[verdict] = expect.verdicts.at(verdict);
-  if (differing != 0)
-    answer["failure"] = fmt::format("{} of {} pixels differ from the specification of {}", differing,
+  if (drawn.differing != 0)
+    answer["failure"] = fmt::format("{} of {} pixels differ from the specification of {}", drawn.differing,
                                     settings.pixels(), point.numeric);
   else if (answer["failure"].is_null())
     answer["failure"] = expect.verdicts.at("failure");

@@ -15,6 +15,19 @@ namespace rasterbench {
 /// The hash of what `renderer` drew last, colours and depths: ties a timed frame to the verified one.
 std::string picture_hash(const Renderer& renderer);
 
+/// What a kernel drew beside the specification of its mode.
+struct Conformance {
+  std::int64_t differing = 0;  ///< pixels, the most of all frames
+  FrameReport report;          ///< of the last frame
+  std::size_t bytes = 0;       ///< of all buffers of the renderer
+  std::string picture;         ///< picture_hash() of the last frame
+};
+
+/// Draws with the screen triangles permuted and in order, two frames each: the second frame meets what the
+/// first left in the strategy's memory, as every timed frame does.
+Conformance check_conformance(const std::string& kernel, const std::string& mode, RendererSetup setup,
+                              const Picture& specification);
+
 /// Judges points. Keeps what the last ones were compared with: points are sorted by it.
 class Verifier {
  public:

@@ -8,6 +8,7 @@
 #include "harness/explain.h"
 #include "harness/progress.h"
 #include "harness/verdict_json.h"
+#include "harness/verify.h"
 #include "kernels/kernel.h"
 #include "reference/ray_cast_frame.h"
 #include "scene/image.h"
@@ -20,6 +21,7 @@ struct VerifyOptions {
   std::vector<std::string> kernels, numerics;
   std::string size, fill = "closed", near_rule = "clip";
   int threads = 0;
+  bool oversubscribe = false;
   std::string difference, explain;
   bool json = false;
 };
@@ -92,9 +94,8 @@ void print_row(const Json& row) {
 /// One kernel in one mode: draws, compares with the specification, adds the verdicts on the mode.
 Json verify_row(const std::string& kernel, const Picture& specification, const Json& verdicts,
                 const RendererSetup& setup, const ModeInfo& mode) {
-  const auto renderer = make_renderer(kernel, mode.name, setup);
-  renderer->draw();
-  const std::int64_t differing = differing_pixels(picture_of(*renderer, setup.settings), specification);
+  const std::int64_t differing =
+      check_conformance(kernel, std::string(mode.name), setup, specification).differing;
   Json row{{"numeric", mode.name}, {"kernel", kernel}};
   Json& verify = row["verify"];
   verify["conforms"] = differing == 0;
@@ -122,6 +123,7 @@ int verify_scene(const VerifyOptions& options, const std::string& model, Json& r
 
   DrawOptions draw;
   draw.threads = options.threads;
+  draw.oversubscribe = options.oversubscribe;
   const ExecutionConfig execution = execution_of(draw);
   Judge judge(scene, settings, execution.threads);
   if (!options.explain.empty()) {
@@ -144,7 +146,7 @@ int verify_scene(const VerifyOptions& options, const std::string& model, Json& r
     for (const std::string& kernel : options.kernels)
       if (find_kernel(kernel).variant(name).make) kernels.push_back(kernel);
     ++done;
-    if (kernels.empty()) continue;
+    if (kernels.empty()) continue;  // ray_cast beside other kernels, and the other way round
     if (!mode.has_screen_triangles) {
       try {
         check_ray_cast_settings(settings);
@@ -175,6 +177,9 @@ int verify_scene(const VerifyOptions& options, const std::string& model, Json& r
     }
   }
   progress.clear();
+  if (rows.empty())
+    throw InputError({.field = "--kernel"},
+                     notes.empty() ? "none of these kernels can carry one of these modes" : notes.front());
   if (!options.json) {
     const EndToEndTruth& truth = judge.truth();
     fmt::print("end-to-end truth: {} pixels by multiprecision, {} ambiguous, {:.1f} s; Embree {}\n",
@@ -205,8 +210,13 @@ void check_options(VerifyOptions& options) {
     if (!available_mode(options.numerics.front(), "--numeric").has_screen_triangles)
       throw InputError({.field = "--difference"}, "needs a mode that the exact oracle can judge");
   }
-  if (!options.explain.empty() && options.model.empty())
-    throw InputError({.field = "--explain"}, "needs a MODEL");
+  if (options.explain.empty()) return;
+  if (options.model.empty()) throw InputError({.field = "--explain"}, "needs a MODEL");
+  if (options.json || !options.difference.empty())
+    throw InputError({.field = "--explain"}, "tells a story: it goes without --json and --difference");
+  if (options.numerics == std::vector<std::string>{std::string(kRayCastInfo.name)})
+    throw InputError({.field = "--explain"},
+                     "needs a mode of screen triangles; Embree's owner is always told");
 }
 
 }  // namespace
@@ -225,6 +235,7 @@ void add_verify_command(CLI::App& app, Outcome& outcome) {
   command->add_option("--near", o->near_rule, "clip at the near plane, or off")->capture_default_str();
   command->add_option("--threads", o->threads, "threads of kernels and judges (default: all CPUs)")
       ->check(CLI::Range(1, 65536));
+  command->add_flag("--oversubscribe", o->oversubscribe, "allow more threads than CPUs");
   command->add_option("--difference", o->difference,
                       "IMAGE.png: where one mode's picture differs from the oracle's, by class");
   command->add_option("--explain", o->explain,

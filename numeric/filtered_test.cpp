@@ -168,6 +168,31 @@ TYPED_TEST(FilteredCoverage, OnAreasOfOneLastBit) {
   EXPECT_GT(tally.uncertain, 5000);
 }
 
+TYPED_TEST(FilteredCoverage, OnAreasThatADoubleRounds) {
+  // One corner next to the origin, where float32 is finer than the last bit of a double elsewhere, the others
+  // on a line from it through centres: the sign of the area is below the rounding of its products.
+  Random random(76);
+  Tally tally;
+  for (int i = 0; i < 400; ++i) {
+    const double p = static_cast<double>(random.bits() % 4) * 2 + 1,
+                 q = static_cast<double>(random.bits() % 4) * 2 + 1;
+    const double tiny = std::pow(10.0, random.uniform(-30, -6));
+    const double k = static_cast<double>(random.bits() % 8) + 0.5,
+                 m = k + 1 + static_cast<double>(random.bits() % 60);
+    Corners c{{{as_float(tiny * p), as_float(tiny * q)},
+               {as_float(k * p), as_float(k * q)},
+               {as_float(m * p), as_float(m * q)}}};
+    float& moved = c[0][random.bits() % 2];
+    if (i % 4 != 0) moved = std::nextafter(moved, i % 4 == 1 ? 1.0f : -1.0f);
+    ASSERT_NO_FATAL_FAILURE(expect_exact_along_edges<TypeParam>(c, random, tally));
+    for (double at = k; at < m; at += 1 + static_cast<double>(random.bits() % 3))
+      ASSERT_NO_FATAL_FAILURE(expect_exact<TypeParam>(screen_triangle(c), static_cast<std::int32_t>(at * p),
+                                                      static_cast<std::int32_t>(at * q), tally));
+  }
+  EXPECT_GT(tally.covered, 500);
+  EXPECT_GT(tally.uncertain, 5000);
+}
+
 TEST(FilteredEdges, RarelyNeedExactArithmeticOnRandomTriangles) {
   // What "nearly the cost of float32" rests on.
   Random random(75);

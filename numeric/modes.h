@@ -75,14 +75,15 @@ struct F32 : Combined<CrossEdges<float>, F32Depth> {
 };
 
 struct F32Plane : Combined<PlaneEdges, F32Depth> {
-  static constexpr ModeInfo kInfo{
-      .name = "f32_plane",
-      .vertices = mode_text::kF32Vertices,
-      .edges = "float32, A x + B y + C",
-      .depth = mode_text::kF32Plane,
-      .bound = "a centre is misclassified only within about 3u X^2 / L px of an edge (L = the edge's length)",
-      .bound_source = mode_text::kHigham,
-      .numbers = {.edge_form = EdgeForm::kPlane}};
+  static constexpr ModeInfo kInfo{.name = "f32_plane",
+                                  .vertices = mode_text::kF32Vertices,
+                                  .edges = "float32, A x + B y + C",
+                                  .depth = mode_text::kF32Plane,
+                                  .bound =
+                                      "a centre is misclassified only within about 8u R px of an edge (R = "
+                                      "the distances of the centre and of the edge from the image's origin)",
+                                  .bound_source = mode_text::kHigham,
+                                  .numbers = {.edge_form = EdgeForm::kPlane}};
 };
 
 struct F32Incremental : Combined<IncrementalEdges, F32Depth> {
@@ -97,7 +98,7 @@ struct F32Incremental : Combined<IncrementalEdges, F32Depth> {
       .vertices = mode_text::kF32Vertices,
       .edges = "float32, (b-a)x(p-a) at every 64th column, one addition a pixel from there",
       .depth = mode_text::kF32Plane,
-      .bound = "a centre is misclassified only within about 64u X px of an edge",
+      .bound = "a centre is misclassified only within about 72u (R + 128) px of an edge (R as in f32)",
       .bound_source = mode_text::kHigham,
       .numbers = {.edge_form = EdgeForm::kIncremental}};
 };

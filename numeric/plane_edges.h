@@ -1,5 +1,5 @@
 // Edge functions A x + B y + C in float32: the form of most textbooks and the cheapest to step, with errors
-// that grow with the square of the distance from the image's origin.
+// that grow with the distance from the image's origin instead of from the edge.
 #pragma once
 
 #include "numeric/cross_edges.h"

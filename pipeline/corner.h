@@ -60,6 +60,11 @@ bool any(const Corners& corners, Test test) {
   return false;
 }
 
+template <class Corners, class Test>
+bool all(const Corners& corners, Test test) {
+  return !any(corners, [&](const auto& corner) { return !test(corner); });
+}
+
 /// Whether the box of the points misses the image.
 template <class Points>
 bool misses_image(const Points& points, const ScreenTransform& t) {

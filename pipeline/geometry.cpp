@@ -113,7 +113,10 @@ struct Passage {
     if (needs.zero_area_test && has_zero_area(triangle)) return ++counts.zero_area, false;
     const std::array corners{transform_corner(transform, triangle.a), transform_corner(transform, triangle.b),
                              transform_corner(transform, triangle.c)};
-    if (reaches_before_near(corners)) return cut_and_finish(corners);
+    if (reaches_before_near(corners)) {
+      if (all(corners, is_before_near)) return ++counts.behind_near, false;
+      return cut_and_finish(corners);
+    }
     if (!lies_between_planes(corners)) return false;
     if (leaves_guard_band(corners)) return cut_and_finish(corners);
     return finish(corners, [](const ScreenPoint& p) { return p; });

@@ -37,7 +37,7 @@ NeedsAnalysis analyse_needs(std::span<const Triangle> triangles, const ScreenTra
       a.farthest = std::max(a.farthest, corner.near_distance);
     }
     if (near_rule == NearRule::kClip && any(corners, is_before_near)) {
-      ++a.before_near;
+      ++(all(corners, is_before_near) ? a.before_near : a.across_near);
     } else if (any(corners, has_no_place)) {
       ++a.behind;
     } else if (!any(corners, [&](const Corner& c) { return is_before_far(c, transform); })) {
@@ -50,12 +50,12 @@ NeedsAnalysis analyse_needs(std::span<const Triangle> triangles, const ScreenTra
       a.off_screen += misses_image(points, transform);
     }
   }
-  const bool near = a.before_near > 0, guard = near || a.beyond_guard > 0;
+  const bool across = a.across_near > 0, guard = across || a.beyond_guard > 0;
   a.needs = {.finite_test = a.non_finite > 0,
              .zero_area_test = a.zero_area > 0,
-             .near_clip = near,
-             .behind_reject = near || a.behind > 0,
-             .far_reject = near || a.beyond_far > 0,
+             .near_clip = across || a.before_near > 0,
+             .behind_reject = across || a.behind > 0,
+             .far_reject = across || a.beyond_far > 0,
              .guard_clip = guard,
              .off_screen_reject = guard || a.off_screen > 0};
   return a;
@@ -74,7 +74,8 @@ std::vector<NeedStatement> explain_needs(const NeedsAnalysis& a, const Camera& c
   state("test of zero area", a.needs.zero_area_test, counted(a.zero_area, " has", "s have") + " no area",
         "every triangle has an area");
   state("near clip", a.needs.near_clip,
-        counted(a.before_near, " reaches", "s reach") + " in front of the near plane",
+        counted(a.across_near, " lies", "s lie") +
+            fmt::format(" across the near plane, {} before it", a.before_near),
         a.near_rule == NearRule::kOff ? "switched off (near = off)"
         : seen ? fmt::format("the nearest corner is {:.3g} behind the near plane", a.nearest)
                : "there is no corner");
@@ -98,7 +99,7 @@ std::vector<NeedStatement> explain_needs(const NeedsAnalysis& a, const Camera& c
                     kGuardBand));
   state("off-screen rejection", a.needs.off_screen_reject,
         a.off_screen > 0    ? counted(a.off_screen, " misses", "s miss") + " the image"
-        : a.before_near > 0 ? kAfterNear
+        : a.across_near > 0 ? kAfterNear
                             : kAfterGuard,
         "no triangle misses the image");
   return all;

@@ -29,7 +29,8 @@ struct NeedsAnalysis {
   std::int64_t triangles = 0;
   std::int64_t non_finite = 0;
   std::int64_t zero_area = 0;
-  std::int64_t before_near = 0;   ///< some corner in front of the near plane; 0 with NearRule::kOff
+  std::int64_t before_near = 0;   ///< every corner in front of the near plane; 0 with NearRule::kOff
+  std::int64_t across_near = 0;   ///< some corner in front of it and some not; 0 with NearRule::kOff
   std::int64_t behind = 0;        ///< of the others, some corner at w <= 0
   std::int64_t beyond_far = 0;    ///< of the others, no corner before the far plane
   std::int64_t beyond_guard = 0;  ///< of the others, some corner outside the guard band
@@ -40,8 +41,8 @@ struct NeedsAnalysis {
   double outermost = 0;  ///< largest |x| or |y| in pixels of the corners of triangles that no plane cuts
 };
 
-/// Where a triangle reaches in front of the near plane or out of the guard band, the tests that follow are
-/// kept without a look at what the cut leaves of it.
+/// Where a triangle lies across the near plane or the guard band, the tests that follow are kept without a
+/// look at what the cut leaves of it.
 NeedsAnalysis analyse_needs(std::span<const Triangle> triangles, const ScreenTransform& transform,
                             NearRule near_rule);
 

@@ -123,9 +123,10 @@ TEST(Needs, EveryTestIsFoundByItself) {
     SceneNeeds needs;
     NearRule near_rule = NearRule::kClip;
   };
-  SceneNeeds after_near{}, of_finite{kNothing}, of_area{kNothing}, of_behind{kNothing}, of_far{kNothing},
-      of_guard{kNothing}, of_screen{kNothing};
+  SceneNeeds after_near{}, of_near{kNothing}, of_finite{kNothing}, of_area{kNothing}, of_behind{kNothing},
+      of_far{kNothing}, of_guard{kNothing}, of_screen{kNothing};
   after_near.finite_test = after_near.zero_area_test = false;
+  of_near.near_clip = true;
   of_finite.finite_test = true;
   of_area.zero_area_test = true;
   of_behind.behind_reject = true;
@@ -137,6 +138,7 @@ TEST(Needs, EveryTestIsFoundByItself) {
       {{{nan, -1, -2}, {1, -1, -2}, {0, 1, -4}}, of_finite},
       {{{1, -1, -2}, {1, -1, -2}, {0, 1, -4}}, of_area},
       {{{-1, -1, -0.5f}, {1, -1, -2}, {0, 1, -4}}, after_near},
+      {{{-1, -1, -0.5f}, {1, -1, 2}, {0, 1, -0.9f}}, of_near},
       {{{-1, -1, -0.5f}, {1, -1, -2}, {0, 1, -4}}, kNothing, NearRule::kOff},  // drawn as it is
       {{{-1, -1, 1}, {1, -1, -2}, {0, 1, -4}}, of_behind, NearRule::kOff},
       {{{-1, -1, -9}, {1, -1, -10}, {0, 1, -11}}, of_far},
@@ -194,9 +196,9 @@ TEST(Needs, AreExplainedWithNumbers) {
                             "off-screen rejection: left out, no triangle misses the image\n"})
     EXPECT_NE(text.find(words), std::string::npos) << words << "is not in\n" << text;
   const Triangle cut{{0, 0, 3}, {1, 0, -1}, {0, 1, -1}};
-  EXPECT_NE(lines({t, cut}).find("near clip: kept, 1 triangle reaches in front of the near plane\n"),
+  EXPECT_NE(lines({t, cut}).find("near clip: kept, 1 triangle lies across the near plane, 0 before it\n"),
             std::string::npos);
-  EXPECT_NE(lines({t, cut, cut}).find("near clip: kept, 2 triangles reach "), std::string::npos);
+  EXPECT_NE(lines({t, cut, cut}).find("near clip: kept, 2 triangles lie "), std::string::npos);
   EXPECT_NE(lines({t, cut}, NearRule::kOff).find("near clip: left out, switched off"), std::string::npos);
 }
 

@@ -88,10 +88,18 @@ Comparison judge(const std::vector<Triangle>& triangles, const Camera& camera, F
                              triangles, camera, near_rule, Mode::kInfo.numbers);
 }
 
+/// Modes whose edges are cross products or exact and whose depths are d: what the double renderer's bounds
+/// are about. The oracle judges the others (prediction_test.cpp).
 template <class Mode>
 class EveryMode : public testing::Test {};
-using Modes = testing::Types<F32, F64, Fixed8>;
-TYPED_TEST_SUITE(EveryMode, Modes);
+using Modes = testing::Types<F32, F64, Fixed8, Fixed12, Filtered, ExactMode>;
+struct ModeNames {
+  template <class Mode>
+  static std::string GetName(int) {
+    return std::string(Mode::kInfo.name);
+  }
+};
+TYPED_TEST_SUITE(EveryMode, Modes, ModeNames);
 
 void expect_explained(const Comparison& result, double worst_share) {
   EXPECT_EQ(result.errors, 0) << "first at " << result.worst_pixel << " of " << result.pixels;

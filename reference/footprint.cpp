@@ -99,20 +99,31 @@ struct EdgeView {
   double length;
   double outside;  // distance to the edge's line, positive on the outside
   double error;    // how far the line may have moved there
-  double start;    // distance to the farther end, which the error of the edge function is proportional to
+  double start;    // what the error of the edge function is proportional to, px
 };
+
+// Of (b-a)x(p-a): the distance to the farther end. Of A x + B y + C, by Cauchy & Schwarz: the distances of p
+// and of an end from the image's origin. Of additions: up to 64 pixels farther away, and 64 more roundings of
+// sums up to 64 pixels larger, in units of kEdgeRoundings roundings.
+double edge_start(EdgeForm form, const Vertex& a, const Vertex& b, double x, double y) {
+  const double cross = std::max(distance(x, y, a), distance(x, y, b));
+  if (form == EdgeForm::kPlane)
+    return std::hypot(x, y) + std::max(std::hypot(a.x, a.y), std::hypot(b.x, b.y));
+  if (form == EdgeForm::kIncremental) return (1 + 64.0 / kEdgeRoundings) * (cross + 128);
+  return cross;
+}
 
 // With a and b moved by at most ea and eb, and p = a + t (b - a) + s n, (b'-a')x(p-a') differs from L s by at
 // most L (|1-t| ea + |t| eb) + |s| (ea + eb) + ea eb: expand the product. Hence it has the sign of s where
 // |s| exceeds `error`.
-EdgeView view_of(const Polygon& polygon, std::size_t i, double x, double y) {
+EdgeView view_of(const Polygon& polygon, std::size_t i, double x, double y, EdgeForm form) {
   const Vertex &a = polygon.vertices[i], &b = polygon.vertices[polygon.next(i)];
   const double ux = b.x - a.x, uy = b.y - a.y, vx = x - a.x, vy = y - a.y;
   const double length = std::hypot(ux, uy);
   EdgeView view{.length = length,
                 .outside = -(ux * vy - uy * vx) / length * polygon.orientation,
                 .error = INFINITY,
-                .start = std::max(distance(x, y, a), distance(x, y, b)) + polygon.reach};
+                .start = edge_start(form, a, b, x, y) + polygon.reach};
   if (polygon.orientation == 0) view.outside = std::abs(ux * vy - uy * vx) / length;
   const double room = length - (a.reach + b.reach);
   if (room > 0) {
@@ -139,7 +150,7 @@ void finish(Polygon& polygon, const ModeBound& bound) {
   for (std::size_t i = 0; i < v.size(); ++i) {
     for (std::size_t k = 0; k < v.size(); ++k) {
       if (k == i || k == polygon.next(i)) continue;
-      const EdgeView view = view_of(polygon, i, v[k].x, v[k].y);
+      const EdgeView view = view_of(polygon, i, v[k].x, v[k].y, bound.edge_form);
       // The kernel computes the area from any two sides, which may be longer than this one.
       const double area_error = gamma(kEdgeRoundings, bound.edge_unit) * view.start * polygon.perimeter;
       const double error = view.error + 2 * v[k].reach + area_error / view.length;
@@ -161,7 +172,7 @@ bool may_be_inside(const Polygon& polygon, double x, double y, const ModeBound& 
     return false;
   const double edge_error = gamma(kEdgeRoundings, bound.edge_unit);
   for (std::size_t i = 0; i < polygon.vertices.size(); ++i) {
-    const EdgeView view = view_of(polygon, i, x, y);
+    const EdgeView view = view_of(polygon, i, x, y, bound.edge_form);
     if (view.length <= 4 * r) continue;  // may point anywhere
     const double tolerance = polygon.firm[i] ? std::min(view.error, r) + edge_error * view.start
                                              : r + edge_error * view.start * polygon.perimeter / view.length;
@@ -177,7 +188,7 @@ bool must_be_inside(const Polygon& polygon, double x, double y, const ModeBound&
   if (polygon.vertices.size() < 3 || !polygon.is_bounded || polygon.orientation == 0) return false;
   const double edge_error = gamma(kEdgeRoundings, bound.edge_unit);
   for (std::size_t i = 0; i < polygon.vertices.size(); ++i) {
-    const EdgeView view = view_of(polygon, i, x, y);
+    const EdgeView view = view_of(polygon, i, x, y, bound.edge_form);
     if (view.length == 0) continue;
     if (!(-view.outside > std::min(view.error, polygon.reach) + edge_error * view.start)) return false;
   }

@@ -43,7 +43,8 @@ Model read_dat(const std::filesystem::path& path, std::FILE* warnings) {
     throw InputError({.file = name, .byte = 0}, fmt::format("{} ({} bytes)", counts, file.size()));
   const std::uint64_t used = kHeaderBytes + wanted * sizeof(Triangle);
   if (used < file.size())
-    fmt::print(warnings, "warning: {}: {}; the last {} bytes are ignored\n", name, counts, file.size() - used);
+    fmt::print(warnings, "warning: {}: {}; the last {} bytes are ignored\n", name, counts,
+               file.size() - used);
 
   Model model;
   model.name = name;

@@ -87,6 +87,31 @@ def test_a_folder_that_cannot_be_is_refused(tmp_path: Path) -> None:
     refused(run("fuzz", "--out", tmp_path / "file" / "below"), str(tmp_path / "file" / "below"))
 
 
+def test_a_crash_says_how_to_see_it_again() -> None:
+    process = subprocess.Popen(command("fuzz", "--seconds", 600, "--seed", 4, "--relation", "turn", "--first", 5), env=environment(),
+                               stdout=subprocess.PIPE, stderr=subprocess.PIPE, bufsize=0)
+    try:
+        assert process.stderr is not None
+        process.stderr.readline()  # the first report of progress
+        process.send_signal(signal.SIGSEGV)
+        _, stderr = process.communicate(timeout=TIMEOUT)
+    finally:
+        if process.poll() is None:
+            process.kill()
+            process.communicate()
+    assert process.returncode == -signal.SIGSEGV
+    (options,) = re.findall(r"crashed in: (fuzz .*)", stderr.decode())
+    assert re.fullmatch(r"fuzz --seed 4 --first \d+ --cases 1 --relation turn --numeric \S+", options)
+    assert "1 cases in" in run(*options.split()).ok().stdout
+
+
+def test_a_case_is_found_again_by_its_number() -> None:
+    found = run("fuzz", *CANARY, "--cases", 3, "--seed", 6).stdout
+    (number,) = re.findall(r"TEST\(Fuzz, \w+Case(\d+)\)", found)
+    again = run("fuzz", *CANARY, "--first", number, "--cases", 1, "--seed", 6).stdout
+    assert again.split("\nrelation")[0] == found.split("\nrelation")[0]
+
+
 def test_interrupted_it_says_what_was_found_so_far() -> None:
     process = subprocess.Popen(command("fuzz", *CANARY, "--seconds", 600), env=environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                                bufsize=0)  # so that readline() takes one line and leaves the rest to communicate()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 from .conftest import SmallScene
-from .program import refused, read_png, run, snapshot
+from .program import TIMEOUT, command, environment, read_png, refused, run, snapshot
 
 
 def rows(*arguments: object, code: int = 0) -> dict[tuple[str, str], dict[str, Any]]:
@@ -57,8 +58,9 @@ def test_every_mode_conforms_and_keeps_its_bound(scene: str, request: pytest.Fix
 
 
 def test_a_kernel_that_does_not_conform_fails(teapot: SmallScene) -> None:
-    outcome = run("verify", teapot.dat, teapot.txt, "--kernel", "null", "--kernel", "scanline", "--numeric", "f32")
+    outcome = run("verify", teapot.dat, teapot.txt, "--kernel", "null", "--kernel", "stale", "--kernel", "scanline", "--numeric", "f32")
     assert outcome.code == 1
+    assert re.search(r"f32 +stale +NO", outcome.stdout)
     assert re.search(r"f32 +null +NO", outcome.stdout)
     assert re.search(r"f32 +scanline +yes", outcome.stdout)
     assert "FAILED null f32:" in outcome.stdout and "pixels differ from the specification" in outcome.stdout
@@ -116,6 +118,10 @@ def test_the_story_of_a_pixel(teapot: SmallScene, tmp_path: Path) -> None:
     (["--size", "0x5"], ["--size"]),
     (["--fill", "open"], ["--fill"]),
     (["--threads", "0"], ["--threads"]),
+    (["--kernel", "ray_cast", "--numeric", "f32"], ["--kernel", "none of these"]),
+    (["--numeric", "ray_cast", "--fill", "top-left"], ["--fill"]),
+    (["--explain", "1,1", "--json"], ["--explain"]),
+    (["--explain", "1,1", "--numeric", "ray_cast"], ["--explain"]),
 ])
 def test_bad_options(arguments: list[str], words: list[str], teapot: SmallScene, tmp_path: Path) -> None:
     refused(run("verify", teapot.dat, teapot.txt, *arguments, cwd=tmp_path), *words)
@@ -124,3 +130,10 @@ def test_bad_options(arguments: list[str], words: list[str], teapot: SmallScene,
 
 def test_an_option_that_needs_a_model() -> None:
     refused(run("verify", "--explain", "0,0"), "--explain", "MODEL")
+
+
+def test_a_table_that_cannot_be_written_is_an_error(teapot: SmallScene) -> None:
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(command("verify", teapot.dat, teapot.txt, "--numeric", "f32"), stdout=full, stderr=subprocess.PIPE,
+                              text=True, timeout=TIMEOUT, env=environment(), check=False)
+    assert done.returncode == 1 and "stdout cannot be written" in done.stderr
