@@ -22,6 +22,7 @@ constexpr double kHopeless = 3;  // times the fastest: a kernel's other modes an
 constexpr std::size_t kFinalists = 4;  // at most, and none that was slower than the fastest by more than half
 constexpr double kFinalistShare = 1.5;
 constexpr std::size_t kMostRounds = 100;
+constexpr double kLeastRounds = 6;  // below, a median has no 95 % interval
 /// Tried first, should the time not suffice for all: the usual winners.
 constexpr std::string_view kFirstKernels[] = {"tile_parallel", "row_parallel", "scanline",
                                               "triangle_atomics"};
@@ -55,13 +56,12 @@ class Bench {
 
   /// The sufficient modes, timed under one kernel; the fastest few of them.
   std::vector<const ModeVerdict*> fastest_modes(std::span<const ModeVerdict> verdicts) {
-    const ExecutionConfig execution = tried_executions(plan_.threads).front();
+    const std::string kernel(kFirstKernels[0]);
     for (const ModeVerdict& verdict : verdicts)
-      if (verdict.standing == Standing::kSuffices)
-        try_in_time({"tile_parallel", &verdict, execution}, kTrialShare);
-    std::vector<const Measurement*> ranked = conforming();
+      if (verdict.standing == Standing::kSuffices && find_kernel(kernel).variant(verdict.mode->name).make)
+        try_in_time({kernel, &verdict, tried_executions(plan_.threads).front()});
     std::vector<const ModeVerdict*> modes;
-    for (const Measurement* m : ranked)
+    for (const Measurement* m : conforming())
       if (modes.size() < kModes) modes.push_back(m->candidate.verdict);
     return modes;
   }
@@ -85,8 +85,7 @@ class Bench {
           ++result_.hopeless;
           continue;
         }
-        const Candidate candidate{kernel, verdict, execution};
-        try_in_time(candidate, kTrialShare);
+        try_in_time({kernel, verdict, execution});
         for (const Measurement* m : conforming())
           if (m->candidate.kernel == kernel) best = std::min(best, m->trial_ms);
       }
@@ -110,10 +109,10 @@ class Bench {
     });
   }
 
-  void try_in_time(const Candidate& candidate, double until) {
+  void try_in_time(const Candidate& candidate) {
     if (is_known(candidate)) return;
-    // The first is always tried: an answer that took too long is worth more than none.
-    if (share() >= until && !result_.all.empty()) {
+    // Until there is one, whatever it takes: an answer that took too long is worth more than none.
+    if (share() >= kTrialShare && !conforming().empty()) {
       ++result_.no_time;
       return;
     }
@@ -144,25 +143,39 @@ class Bench {
     return time.count() / frames;
   }
 
+  /// Frames that make one sample of `m`.
+  static int frames_of(const Measurement& m) {
+    return std::clamp(static_cast<int>(std::ceil(kShortestSampleMs / m.trial_ms)), 1, kMostFrames);
+  }
+
+  /// Indices of the fastest few: fewer where the time does not suffice for rounds enough to tell them apart.
+  std::vector<std::size_t> finalists() const {
+    const std::vector<const Measurement*> ranked = conforming();
+    const double left_ms = (plan_.seconds - elapsed()) * 1e3;
+    std::vector<std::size_t> chosen;
+    double round_ms = 0;
+    for (const Measurement* m : ranked) {
+      round_ms += m->trial_ms * (1 + frames_of(*m));  // an untimed frame first
+      if (chosen.size() == kFinalists || m->trial_ms > kFinalistShare * ranked.front()->trial_ms) break;
+      if (chosen.size() >= 2 && round_ms * kLeastRounds > left_ms) break;
+      chosen.push_back(static_cast<std::size_t>(m - result_.all.data()));
+    }
+    return chosen;
+  }
+
   void final_rounds() {
-    std::vector<std::size_t> finalists;
-    for (const Measurement* m : conforming())
-      if (finalists.size() < kFinalists)
-        finalists.push_back(static_cast<std::size_t>(m - result_.all.data()));
-    if (finalists.empty()) return;
+    std::vector<std::size_t> order = finalists();
     Random random(plan_.seed);
     for (std::size_t round = 0; round < kMostRounds && (round == 0 || share() < 1); ++round) {
-      for (std::size_t i = finalists.size(); i > 1; --i)
-        std::swap(finalists[i - 1], finalists[random.bits() % i]);  // Fisher & Yates
-      for (const std::size_t i : finalists) {
+      for (std::size_t i = order.size(); i > 1; --i)
+        std::swap(order[i - 1], order[random.bits() % i]);  // Fisher & Yates
+      for (const std::size_t i : order) {
         Measurement& m = result_.all[i];
         progress_(share(), name_of(m.candidate));
         // A renderer of its own for every sample, so that no layout of memory is in all of them.
         const auto renderer = make(m.candidate);
         renderer->draw();
-        const int frames =
-            std::clamp(static_cast<int>(std::ceil(kShortestSampleMs / m.trial_ms)), 1, kMostFrames);
-        m.rounds_ms.push_back(frame_ms(*renderer, frames));
+        m.rounds_ms.push_back(frame_ms(*renderer, frames_of(m)));
       }
     }
   }
