@@ -131,14 +131,10 @@ int verify_scene(const VerifyOptions& options, const std::string& model, Json& r
     return 0;
   }
 
-  if (!options.json) {
-    fmt::print("{}{} at {}x{}, {}\n", rows.empty() ? "" : "\n", model, settings.width, settings.height,
-               options.fill);
-    print_head();
-  }
   Progress progress;
   std::vector<std::pair<std::string, std::string>> failures;
   std::vector<std::string> notes;
+  bool head_printed = false;  // not before there is a row: what is refused prints nothing
   std::size_t done = 0;
   for (const std::string& name : options.numerics) {
     const ModeInfo& mode = available_mode(name, "--numeric");
@@ -164,6 +160,12 @@ int verify_scene(const VerifyOptions& options, const std::string& model, Json& r
       row["size"] = {settings.width, settings.height};
       if (!options.json) {
         progress.clear();
+        if (!head_printed) {
+          fmt::print("{}{} at {}x{}, {}\n", rows.empty() ? "" : "\n", model, settings.width, settings.height,
+                     options.fill);
+          print_head();
+          head_printed = true;
+        }
         print_row(row);
       }
       if (!row.at("failure").is_null()) failures.emplace_back(kernel + " " + name, row.at("failure"));

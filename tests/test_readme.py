@@ -184,7 +184,7 @@ def test_links_and_files_of_the_readme_exist() -> None:
             assert (ROOT / script).exists(), script
 
 
-@pytest.mark.parametrize("command", ["curl https://example.org", "scripts/unknown", "rm -rf build", "build/release/bin/rasterbench verify",
+@pytest.mark.parametrize("command", ["curl https://example.org", "scripts/unknown", "rm -rf build", "build/release/bin/rasterbench runner",
                                      "scripts/study && scripts/test", "scripts/test | tail", "scripts/test; ls"])
 def test_a_command_of_no_row_fails(command: str) -> None:
     with pytest.raises(AssertionError, match="neither run nor in the table|more than one plain command"):
