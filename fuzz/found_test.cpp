@@ -25,5 +25,22 @@ TEST(Fuzz, RaysF32RcpSeed2Case213) {
   EXPECT_EQ(violation("rays", "f32-rcp", fuzz_case), "");
 }
 
+// Kernel triangle_locks merged keys that it had never written where a triangle's pixels in a row have a hole,
+// as they can in modes that are not monotone.
+TEST(Fuzz, KernelsTwoProductFmaSeed7Case2447) {
+  const FuzzCase fuzz_case{
+      .space = Space::kWorld,
+      .parameters = {.camera = {0x0p+0, 0x1p+0, 0x1p+0},
+                     .height = 6,
+                     .width = 7,
+                     .theta = 0x1p+0,
+                     .near_plane = 0x1p+0,
+                     .far_plane = 0x1p+1},
+      .seed = 1u,
+      .triangles = {
+          {{0x0p+0f, -0x1p+0f, 0x0p+0f}, {0x0p+0f, 0x0p+0f, 0x0p+0f}, {0x1p+0f, 0x0p+0f, -0x1p-1f}}}};
+  EXPECT_EQ(violation("kernels", "two_product-fma", fuzz_case, {"triangle_locks"}), "");
+}
+
 }  // namespace
 }  // namespace rasterbench::fuzz

@@ -49,8 +49,10 @@ struct TriangleLocks {
       std::array<Key, kSegment> found;
       std::int32_t first = x1, last = x0 - 1;
       for (std::int32_t x = x0; x < x1; ++x) {
+        Key& key = found[static_cast<std::size_t>(x - x0)];
+        key = Mode::kClear;
         if (!Mode::inside(triangle, x, y)) continue;
-        found[static_cast<std::size_t>(x - x0)] = Mode::key(Mode::depth(triangle, x, y), triangle.rank);
+        key = Mode::key(Mode::depth(triangle, x, y), triangle.rank);
         first = std::min(first, x);
         last = x;
       }
@@ -59,8 +61,8 @@ struct TriangleLocks {
           static_cast<std::size_t>(y) * static_cast<std::size_t>(out.width / kSegment + 1) +
           static_cast<std::size_t>(x0 / kSegment);
       const std::lock_guard<std::mutex> guard(locks_[segment % kLocks].mutex);
-      // What a triangle covers of a row is one span (modes are monotone along rows), so every key in it was
-      // written.
+      // Not every mode is monotone along rows: between the first and the last there may be holes, which are
+      // clear and win nothing.
       for (std::int32_t x = first; x <= last; ++x) {
         Key& pixel = out.at(x, y);
         const Key& key = found[static_cast<std::size_t>(x - x0)];

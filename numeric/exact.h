@@ -14,7 +14,7 @@ struct Exact : ExactKeys {
   struct Prepared : FilteredEdges::Setup {
     PixelBox box;
     Plane::Setup plane;
-    float error;  ///< of the plane at samples of the box
+    float depth_error;  ///< of the plane at samples of the box
     const ScreenTriangle<float>* triangle;
     std::uint32_t rank;
   };
@@ -27,7 +27,7 @@ struct Exact : ExactKeys {
     if (!FilteredEdges::setup(t, grid, p)) return p;  // draws nothing: the box stays empty
     p.box = sample_box(t);
     p.plane = Plane::setup(t);
-    p.error = depth_error(t, p.plane);
+    p.depth_error = depth_error(t, p.plane);
     return p;
   }
 
@@ -44,7 +44,7 @@ struct Exact : ExactKeys {
   }
 
   static ExactDepth depth(const Prepared& p, std::int32_t x, std::int32_t y) {
-    return {Plane::at(p.plane, x, y), p.error, x, y, p.triangle};
+    return {Plane::at(p.plane, x, y), p.depth_error, x, y, p.triangle};
   }
 
  private:
