@@ -246,7 +246,7 @@ class _Reader:
 
     def verdicts(self, required: bool) -> dict[str, Any]:
         verify = self.mapping("verify", required)
-        for part in ("oracle", "end_to_end", "embree", "bound"):
+        for part in ("oracle", "end_to_end", "embree", "embree_robust", "bound"):
             if verify.get(part) is None:
                 continue
             if not isinstance(verify[part], dict):

@@ -249,11 +249,12 @@ def _verdicts(whole: Trade, picture: Picture) -> Table:
     numbers, words = [], []
     for mode, record in whole.entries(picture).items():
         oracle = record.verify.get("oracle") if isinstance(record.verify.get("oracle"), dict) else {}
-        end, rays = (record.verify.get(part) if isinstance(record.verify.get(part), dict) else {} for part in ("end_to_end", "embree"))
+        end, rays, robust = (record.verify.get(part) if isinstance(record.verify.get(part), dict) else {}
+                             for part in ("end_to_end", "embree", "embree_robust"))
         conforms = record.verify.get("conforms")
         row = {"mode": mode, "status": record.status, "conforms": conforms, "accuracy": accuracy(record)}
         row |= {f"oracle_{k}": v for k, v in oracle.items()} | {f"end_to_end_{k}": v for k, v in end.items()}
-        row |= {f"embree_{k}": v for k, v in rays.items()}
+        row |= {f"embree_{k}": v for k, v in rays.items()} | {f"embree_robust_{k}": v for k, v in robust.items()}
         predicted = oracle.get("predicted")
         numbers.append(row)
         words.append({
@@ -264,13 +265,16 @@ def _verdicts(whole: Trade, picture: Picture) -> Table:
             "could be wrong": "no bound" if predicted == -1 else _count(predicted),
             "end to end: wrong (ambiguous)": _counts(end, "wrong", "ambiguous"),
             "edge/depth/no bound/error": _slashed(end, "edge_ties", "depth_ties", "unbounded", "errors"),
-            "Embree: edge/depth/error": f"skipped: {rays['skipped']}" if rays.get("skipped") else
-            _slashed(rays, "edge_ties", "depth_ties", "errors")})
+            "Embree: edge/depth/error": _rays(rays), "robust": _rays(robust)})
     note = ("Pixels. Conforms: the bits of the mode's scalar specification. On snapped: against the oracle on the vertices that a fixed-point"
             " mode rounds to. Could be wrong: pixels that the mode's bound leaves open. Classes of wrong pixels: an exact tie, explained by"
             " an edge or a depth gap within the bound, unexplained.")
     return Table(f"verdicts_{picture.slug}", f"Verdicts, {picture.title}", note, pd.DataFrame(numbers), pd.DataFrame(words),
                  section=SECTION, folded=True)
+
+
+def _rays(verdict: dict[str, Any]) -> str:
+    return f"skipped: {verdict['skipped']}" if verdict.get("skipped") else _slashed(verdict, "edge_ties", "depth_ties", "errors")
 
 
 def _count(value: object) -> str:

@@ -33,5 +33,7 @@ function(rasterbench_test folder)
   cmake_parse_arguments(ARG "" "" "LIBRARIES" ${ARGN})
   add_executable(${folder}_test ${ARG_UNPARSED_ARGUMENTS})
   target_link_libraries(${folder}_test PRIVATE ${ARG_LIBRARIES} GTest::gtest_main)
-  gtest_discover_tests(${folder}_test TEST_PREFIX "${folder}." DISCOVERY_TIMEOUT 60)
+  # Tests run side by side, on more threads than CPUs: waiting threads that spin would take the CPU from those they wait for.
+  gtest_discover_tests(${folder}_test TEST_PREFIX "${folder}." DISCOVERY_TIMEOUT 60
+                       PROPERTIES ENVIRONMENT OMP_WAIT_POLICY=passive)
 endfunction()

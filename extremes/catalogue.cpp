@@ -189,6 +189,8 @@ void check_must(const TableReader& reader, const Case& one) {
   if ((!must.survivors.empty() || !must.wrong_at_most.empty()) && !must.match_truth)
     reader.fail("must", "survivors and wrong_at_most are about the truth: match is without it");
   if (must.equal && !must.match_oracle) reader.fail("must", "equal is about the oracle: match is without it");
+  if (must.same_as && must.same_as->name == "mirrored" && one.fills != std::vector{FillRule::kClosed})
+    reader.fail("must", "mirrored needs fill = [\"closed\"]: top-left is another rule in a mirror");
   const bool asks = must.match_oracle || must.match_truth || must.match_rays || must.pixels ||
                     !must.owners.empty() || !must.counts.empty() || must.nothing_tested || must.same_as ||
                     must.every_execution || must.no_background_inside || must.watertight ||

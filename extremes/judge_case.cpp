@@ -45,6 +45,9 @@ Finding judge_by_oracle(const DrawnCase& drawn, const Picture& picture, const Ac
   if (accuracy.unexplained > 0)
     finding.worsen(Verdict::kWrong, fmt::format("{} pixels beyond the bound; {}", accuracy.unexplained,
                                                 story(PixelClass::kUnexplained)));
+  if (accuracy.depth_out_of_bound > 0)
+    finding.worsen(Verdict::kWrong, fmt::format("{} depths of the right triangle beyond the bound",
+                                                accuracy.depth_out_of_bound));
   if (accuracy.unbounded > 0)
     finding.worsen(Verdict::kReported,
                    fmt::format("{} of {} drawn pixels wrong", accuracy.unbounded, drawn_pixels(oracle.ids)));
@@ -264,7 +267,8 @@ Finding CaseJudge::judge_drawn(const DrawnCase& drawn) {
   try {
     const auto renderer = make_renderer(drawn.kernel, drawn.mode.name, {&base.scene, base.settings, {}});
     if (!must.refusal_or_room.empty()) return {};  // memory suffices: nothing of that size is drawn here
-    counts = renderer->draw().counts;
+    renderer->draw();
+    counts = renderer->draw().counts;  // the second frame meets what the first left behind
     picture = picture_of(*renderer, base.settings);
   } catch (const Error& error) {
     return judge_refusal(drawn, error.what());

@@ -48,13 +48,10 @@ bool must_be_watertight(const Must& must, std::string_view mode) {
           std::find(must.watertight->begin(), must.watertight->end(), mode) != must.watertight->end());
 }
 
-std::vector<std::string_view> runnable_modes(std::span<const std::string_view> kernels) {
+std::vector<std::string_view> runnable_modes(std::string_view kernel) {
   std::vector<std::string_view> modes;
   for (const ModeInfo& info : mode_infos())
-    if (info.unavailable.empty() && std::any_of(kernels.begin(), kernels.end(), [&](std::string_view kernel) {
-          return static_cast<bool>(find_kernel(kernel).variant(info.name).make);
-        }))
-      modes.push_back(info.name);
+    if (info.unavailable.empty() && find_kernel(kernel).variant(info.name).make) modes.push_back(info.name);
   return modes;
 }
 

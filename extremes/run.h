@@ -18,8 +18,8 @@ struct CaseResult {
   std::vector<WatertightCount> watertight;  ///< in the order of the modes; empty where nothing was counted
 };
 
-/// The modes that this CPU can run and that at least one of `kernels` can carry, in the order of the list.
-std::vector<std::string_view> runnable_modes(std::span<const std::string_view> kernels);
+/// The modes that this CPU can run and that `kernel` can carry, in the order of the list.
+std::vector<std::string_view> runnable_modes(std::string_view kernel);
 
 /// Whether a gap or an overlap of this mode is wrong.
 bool must_be_watertight(const Must& must, std::string_view mode);

@@ -13,88 +13,94 @@ namespace {
 
 constexpr std::uint64_t kSeed = 1;
 
-/// A teapot of curved surfaces in layers, small enough for the end-to-end truth of many scenes.
-Scene teapot() {
+/// The size of the pictures that the end-to-end truth judges, in pixels: small enough for many of them.
+constexpr int kWidth = 160, kHeight = 90;
+
+/// A teapot of curved surfaces in layers, as large as fits.
+Scene framed_teapot() {
   Scene scene = generate("teapot:triangles=2000");
-  scene.parameters.width = 160;
-  scene.parameters.height = 90;
+  scene.parameters = framing_parameters(scene.model);
+  scene.parameters.width = kWidth;
+  scene.parameters.height = kHeight;
   return scene;
 }
 
-/// The radius about the origin that the generator's camera shows, and its distance.
-struct Framing {
-  double distance, radius;
-};
-Framing framing(const Scene& scene) {
-  const SceneParameters p = framing_parameters(scene.model);
-  const double distance = std::hypot(p.camera.x, p.camera.y, p.camera.z);
-  return {distance, distance - p.near_plane};
-}
+double length(const Vec3d& v) { return std::hypot(v.x, v.y, v.z); }
 
 /// The planes about the object, geometrically: near = distance / sqrt(ratio).
 Scene with_near_far_ratio(double ratio) {
-  Scene scene = teapot();
-  const SceneParameters framed = framing_parameters(scene.model);
-  scene.parameters.camera = framed.camera;
-  const double distance = framing(scene).distance;
+  Scene scene = framed_teapot();
+  const double distance = length(scene.parameters.camera);
   scene.parameters.near_plane = distance / std::sqrt(ratio);
   scene.parameters.far_plane = distance * std::sqrt(ratio);
   return scene;
 }
 
-Scene moved_away(double distance) {
-  Scene scene = teapot();
-  const SceneParameters framed = framing_parameters(scene.model);
-  scene.parameters.camera = framed.camera;
-  scene.parameters.near_plane = framed.near_plane;
-  scene.parameters.far_plane = framed.far_plane;
-  return translated(std::move(scene), distance);
-}
+Scene moved_away(double distance) { return translated(framed_teapot(), distance); }
 
-/// The camera moves back as the field of view narrows, so that the object keeps its size in the picture.
+/// Two walls with relief through each other, across the view axis: the camera moves back as the field of view
+/// narrows, so that a part of the same size fills the picture.
 Scene with_field_of_view(double theta) {
-  Scene scene = teapot();
+  constexpr double kReach = 2;       // of the walls to each side; 1 is visible above and below
+  constexpr double kRelief = 0.004;  // below the distance at the widest angle, 1 / tan(3.1 / 2) = 0.02
+  const double distance = 1 / std::tan(theta / 2);
+  // The view frame of the course contract (accuracy.md, section 1) for the default direction.
+  const SceneParameters defaults;
+  const double from_origin = length(defaults.camera);
+  const Vec3d w{defaults.camera.x / from_origin, defaults.camera.y / from_origin,
+                defaults.camera.z / from_origin};
+  const double ground = std::hypot(w.x, w.z);
+  const Vec3d u{w.z / ground, 0, -w.x / ground}, v{-w.x * w.y / ground, ground, -w.z * w.y / ground};
+
+  Scene scene;
   SceneParameters& p = scene.parameters;
-  const SceneParameters framed = framing_parameters(scene.model);
-  const Framing frame = framing(scene);
-  const double distance = frame.radius * (1 + 1 / std::tan(theta / 2));
-  const double scale = distance / frame.distance;
-  p.camera = {framed.camera.x * scale, framed.camera.y * scale, framed.camera.z * scale};
+  p.camera = {w.x * distance, w.y * distance, w.z * distance};
+  p.width = kWidth;
+  p.height = kHeight;
   p.theta = theta;
-  // Half-way from the camera to the sphere about the object.
-  p.near_plane = (distance - frame.radius) / 2;
-  p.far_plane = distance + frame.radius;
+  p.near_plane = distance - 2 * kRelief;
+  p.far_plane = distance + 2 * kRelief;
+  for (const double waves : {9.0, 13.0})
+    for (Triangle t : ground_plane(1000, kReach, 0.25, kSeed)) {
+      for (Vec3* corner : {&t.a, &t.b, &t.c}) {
+        const double x = corner->x, y = corner->z;
+        const double z = kRelief * std::sin(waves * x + 1) * std::cos(waves * y + 2);
+        *corner = {static_cast<float>(x * u.x + y * v.x + z * w.x), static_cast<float>(y * v.y + z * w.y),
+                   static_cast<float>(x * u.z + y * v.z + z * w.z)};
+      }
+      scene.model.triangles.push_back(t);
+    }
   return scene;
 }
 
 /// Compact triangles with edges of that size, and slivers of that breadth across the image.
 Scene with_triangle_size(double edge) {
-  constexpr int kWidth = 512, kHeight = 256;
+  constexpr int kScreenWidth = 512, kScreenHeight = 256;
   // Fewer where they are large, so that a pixel is not covered by more than some tens of them.
-  const double most = 20.0 * kWidth * kHeight / (0.43 * edge * edge);
+  const double most = 20.0 * kScreenWidth * kScreenHeight / (0.43 * edge * edge);
   const auto count = static_cast<std::int64_t>(std::clamp(most, 100.0, 4000.0));
-  auto triangles = around_samples(count, edge, kSeed, kWidth, kHeight);
-  const auto thin = slivers(count / 10, edge, kSeed, kWidth, kHeight);
+  auto triangles = around_samples(count, edge, kSeed, kScreenWidth, kScreenHeight);
+  const auto thin = slivers(count / 10, edge, kSeed, kScreenWidth, kScreenHeight);
   triangles.insert(triangles.end(), thin.begin(), thin.end());
-  return screen_scene(triangles, kWidth, kHeight);
+  return screen_scene(triangles, kScreenWidth, kScreenHeight);
 }
 
+/// Slivers of a few pixels' breadth across a low and wide image.
 Scene with_image_width(double width) {
-  constexpr int kHeight = 32;
-  const int w =
-      static_cast<int>(std::exp2(std::round(std::log2(width))));  // screen scenes want a power of two
-  return screen_scene(slivers(200, 4, kSeed, w, kHeight), w, kHeight);
+  constexpr int kScreenHeight = 32;
+  const int pixels = static_cast<int>(width);
+  return screen_scene(slivers(200, 4, kSeed, pixels, kScreenHeight), pixels, kScreenHeight);
 }
 
 std::vector<Sweep> all_sweeps() {
   return {
-      {"near_far", "far / near", true, 1e1, 1e18, 18, with_near_far_ratio},
-      {"translation", "distance that object and camera are moved by, world units", true, 1, 1e7, 8,
+      {"near_far", "far / near", true, 1e1, 1e18, 18, false, with_near_far_ratio},
+      {"translation", "distance that object and camera are moved by, world units", true, 1, 1e7, 8, false,
        moved_away},
-      {"field_of_view", "theta, radians", true, 3.1, 1e-5, 12, with_field_of_view},
-      {"triangle_size", "edge of triangles and breadth of slivers, pixels", false, 1e3, 1e-3, 13,
+      {"field_of_view", "theta, radians", true, 3.1, 1e-5, 12, false, with_field_of_view},
+      {"triangle_size", "edge of triangles and breadth of slivers, pixels", false, 1e3, 1e-3, 13, false,
        with_triangle_size},
-      {"image_size", "width, pixels", false, 64, 16384, 9, with_image_width},
+      {"image_size", "width, pixels", false, 64, 16384, 9, true, with_image_width},
   };
 }
 
@@ -110,7 +116,7 @@ SweepPoint by_truth(Judge& judge, const Picture& picture, const ModeInfo& mode) 
           .pixels = verdict.pixels,
           .drawn = drawn_pixels(judge.truth().truth.ids),
           .wrong = verdict.wrong(),
-          .unexplained = verdict.errors,
+          .unexplained = verdict.errors + accuracy.depth_out_of_bound,
           .worst_distance = {},
           .max_depth_error_steps = verdict.max_depth_error_steps};
 }
@@ -121,7 +127,7 @@ SweepPoint by_oracle(Judge& judge, const Picture& picture, const ModeInfo& mode)
           .pixels = accuracy.pixels,
           .drawn = drawn_pixels(judge.oracle(mode).ids),
           .wrong = accuracy.wrong,
-          .unexplained = accuracy.unexplained,
+          .unexplained = accuracy.unexplained + accuracy.depth_out_of_bound,
           .worst_distance = accuracy.worst_distance,
           .max_depth_error_steps = accuracy.max_depth_error_steps};
 }
@@ -147,9 +153,11 @@ std::vector<double> parameter_values(const Sweep& sweep, int steps) {
     const double decade = std::pow(10, std::round(exponent));
     values.push_back(i == 0                                 ? sweep.first
                      : i == steps - 1                       ? sweep.last
+                     : sweep.powers_of_two                  ? std::exp2(std::round(std::log2(value)))
                      : std::abs(value / decade - 1) < 1e-12 ? decade
                                                             : value);
   }
+  values.erase(std::unique(values.begin(), values.end()), values.end());
   return values;
 }
 

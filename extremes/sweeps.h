@@ -20,12 +20,13 @@ struct Sweep {
   bool by_truth;          ///< judged by the end-to-end truth; otherwise by the exact oracle
   double first, last;     ///< of the parameter, spaced evenly in its logarithm
   int steps;              ///< values unless somebody asks for another number
+  bool powers_of_two;     ///< values are rounded to powers of two
   std::function<Scene(double)> make;
 };
 
 std::span<const Sweep> sweeps();
 
-/// The values of a sweep, `steps` >= 2 of them.
+/// The values of a sweep, `steps` >= 2 of them; fewer powers of two where there are not so many.
 std::vector<double> parameter_values(const Sweep& sweep, int steps);
 
 /// One mode at one value of the parameter.
@@ -34,7 +35,7 @@ struct SweepPoint {
   std::int64_t pixels = 0;
   std::int64_t drawn = 0;  ///< by the judge
   std::int64_t wrong = 0;  ///< ids that differ from the judge's; of the truth, its ambiguous ones left out
-  std::int64_t unexplained = 0;  ///< of those, beyond the mode's bound
+  std::int64_t unexplained = 0;  ///< beyond the mode's bound, in id or in depth
   /// Largest distance in pixels of a misclassified sample to the edge; known to the oracle only.
   std::optional<double> worst_distance;
   double max_depth_error_steps = 0;  ///< of d where the id is right, in steps of 2^-24

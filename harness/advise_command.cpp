@@ -6,6 +6,7 @@
 #include "advice/report.h"
 #include "base/error.h"
 #include "harness/commands.h"
+#include "harness/option_checks.h"
 #include "harness/progress.h"
 
 namespace rasterbench {
@@ -22,7 +23,6 @@ struct AdviseOptions {
 };
 
 Tolerance checked_tolerance(const AdviseOptions& o) {
-  if (o.max_wrong < 0) throw InputError({.field = "--max-wrong"}, fmt::format("{} is below 0", o.max_wrong));
   if (o.max_depth_error && !(*o.max_depth_error > 0 && std::isfinite(*o.max_depth_error)))
     throw InputError({.field = "--max-depth-error"},
                      fmt::format("{} is not a distance above 0", *o.max_depth_error));
@@ -76,7 +76,8 @@ void add_advise_command(CLI::App& app, Outcome& outcome) {
   command
       ->add_option("--max-wrong", o->max_wrong,
                    "pixels that may show another triangle than exact arithmetic on the same screen triangles")
-      ->required();
+      ->required()
+      ->check(whole_number_check(0));
   command->add_option("--max-depth-error", o->max_depth_error,
                       "largest error of the depth, in world units along the view axis (default: any)");
   command->add_option("--size", o->size, "WxH in pixels, each 1 to 65536 (default: the scene's)");
@@ -86,7 +87,7 @@ void add_advise_command(CLI::App& app, Outcome& outcome) {
   command->add_option("--near", o->near_rule, "clip at the near plane, or off")->capture_default_str();
   command->add_option("--seconds", o->seconds, "time for measuring, after the scene and the modes are judged")
       ->capture_default_str()
-      ->check(CLI::Range(0.1, 3600.0));
+      ->check(number_check(0.1, 3600));
   command->add_flag(
       "--explain", o->explain,
       "also what the frame leaves out and why, where each mode can go wrong, all that was tried");

@@ -20,7 +20,7 @@ using extremes::Finding;
 using extremes::Verdict;
 
 struct ExtremesOptions {
-  std::vector<std::string> numerics, kernels{"tile_parallel"}, cases;
+  std::vector<std::string> numerics, kernels, cases;
   std::string catalogue;
   int threads = 0;
   bool watertight = false, json = false;
@@ -203,15 +203,29 @@ bool any_wrong(const std::vector<Results>& all) {
   return false;
 }
 
+/// Those that are asked for, or tile_parallel for modes of screen triangles and ray_cast for its own.
+std::vector<std::string_view> chosen_kernels(const std::vector<std::string>& names,
+                                             const std::vector<std::string_view>& modes) {
+  std::vector<std::string_view> chosen;
+  for (const std::string& name : names) chosen.push_back(find_kernel(name).info().name);
+  if (!chosen.empty()) return chosen;
+  for (const std::string_view kernel : {"tile_parallel", "ray_cast"})
+    if (modes.empty() || std::any_of(modes.begin(), modes.end(), [&](std::string_view mode) {
+          return static_cast<bool>(find_kernel(kernel).variant(mode).make);
+        }))
+      chosen.push_back(kernel);
+  return chosen;
+}
+
 /// Cases about reading run once, with the first kernel.
 Results run_kernel(const std::vector<Case>& cases, const std::vector<std::string_view>& modes,
-                   const std::string& kernel, bool is_first, const ExtremesOptions& options,
+                   std::string_view kernel, bool is_first, const ExtremesOptions& options,
                    Progress& progress) {
-  Results results{.kernel = kernel, .modes = modes, .cases = {}, .of_cases = {}};
+  Results results{.kernel = std::string(kernel), .modes = modes, .cases = {}, .of_cases = {}};
   const auto part = options.watertight ? extremes::Part::kWatertight : extremes::Part::kAll;
   for (std::size_t i = 0; i < cases.size(); ++i) {
     if (cases[i].must.is_about_reading() && !is_first) continue;
-    progress.show("extremes, " + kernel, static_cast<double>(i), static_cast<double>(cases.size()),
+    progress.show("extremes, " + results.kernel, static_cast<double>(i), static_cast<double>(cases.size()),
                   cases[i].name);
     results.cases.push_back(cases[i]);
     results.of_cases.push_back(extremes::run_case(cases[i], modes, kernel, part, options.threads));
@@ -220,11 +234,9 @@ Results run_kernel(const std::vector<Case>& cases, const std::vector<std::string
 }
 
 int run_extremes(ExtremesOptions options) {
-  std::vector<std::string_view> kernels;
-  for (const std::string& name : options.kernels) kernels.push_back(find_kernel(name).info().name);
-  std::vector<std::string_view> modes;
-  for (const std::string& name : options.numerics) modes.push_back(available_mode(name, "--numeric").name);
-  if (modes.empty()) modes = extremes::runnable_modes(kernels);
+  std::vector<std::string_view> asked;
+  for (const std::string& name : options.numerics) asked.push_back(available_mode(name, "--numeric").name);
+  const std::vector<std::string_view> kernels = chosen_kernels(options.kernels, asked);
   if (options.threads == 0) options.threads = default_threads();
   if (options.threads > available_cpus())
     throw InputError({.field = "--threads"},
@@ -234,8 +246,9 @@ int run_extremes(ExtremesOptions options) {
   std::vector<Results> all;
   {
     Progress progress;
-    for (const std::string& kernel : options.kernels)
-      all.push_back(run_kernel(cases, modes, kernel, all.empty(), options, progress));
+    for (const std::string_view kernel : kernels)
+      all.push_back(run_kernel(cases, asked.empty() ? extremes::runnable_modes(kernel) : asked, kernel,
+                               all.empty(), options, progress));
   }
   if (options.json) {
     fmt::print("{}\n", dump(results_json(all), 2));
@@ -257,8 +270,9 @@ void add_extremes_command(CLI::App& app, Outcome& outcome) {
       "extremes", "the stress cases in every numeric mode: exact, within bound, reported or WRONG");
   const auto options = std::make_shared<ExtremesOptions>();
   command->add_option("--numeric", options->numerics,
-                      "numeric modes (default: all that this CPU runs and the kernels carry)");
-  command->add_option("--kernel", options->kernels, "strategies")->capture_default_str();
+                      "numeric modes (default: all that this CPU runs and the kernel carries)");
+  command->add_option("--kernel", options->kernels,
+                      "strategies (default: tile_parallel, and ray_cast for its own mode)");
   command->add_option("--case", options->cases, "cases by number or name (default: all)");
   command->add_option("--catalogue", options->catalogue, "FILE.toml instead of the built-in catalogue");
   command->add_option("--threads", options->threads, "number of threads (default: all CPUs of this process)")

@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "fuzz/fuzzer.h"
 #include "harness/commands.h"
+#include "harness/option_checks.h"
 #include "harness/process.h"
 #include "harness/progress.h"
 #include "kernels/kernel.h"
@@ -138,15 +139,15 @@ void add_fuzz_command(CLI::App& app, Outcome& outcome) {
   const auto a = std::make_shared<FuzzArguments>();
   command->add_option("--seconds", a->options.seconds, "begin no new case after this long")
       ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
+      ->check(number_check(0, kLongestSeconds));
   command->add_option("--cases", a->options.cases, "end after so many cases as well (default: no such limit)")
-      ->check(CLI::Range(std::int64_t{1}, std::numeric_limits<std::int64_t>::max()));
+      ->check(whole_number_check(1));
   command->add_option("--first", a->options.first, "number of the first case")
       ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
+      ->check(whole_number_check(0));
   command->add_option("--seed", a->options.seed, "of the sequence of cases; the same seed, the same cases")
       ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
+      ->check(whole_number_check(0));
   command->add_option("--numeric", a->modes, "numeric mode; may be repeated (default: all)")
       ->allow_extra_args(false);
   command->add_option("--kernel", a->kernels, "kernel; may be repeated (default: all)")

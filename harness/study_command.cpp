@@ -7,6 +7,7 @@
 #include "base/suggest.h"
 #include "harness/commands.h"
 #include "harness/coordinator.h"
+#include "harness/option_checks.h"
 #include "harness/runner.h"
 #include "scene/image.h"
 
@@ -178,7 +179,7 @@ void add_study_command(CLI::App& app, Outcome& outcome, const std::vector<std::s
   command
       ->add_option("--time-limit", a->time_limit,
                    "seconds for the whole study; 0: none (default: the study's)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(number_check(0, kLongestSeconds));
   command->add_flag("--oversubscribe", a->oversubscribe, "allow more threads than CPUs");
   command->footer(
       "Google Benchmark's options (--benchmark_filter, _list_tests, _repetitions, _out, _out_format, "

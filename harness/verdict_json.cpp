@@ -33,6 +33,7 @@ Json oracle_json(const Accuracy& a, const OracleEffort& effort) {
   json["colours_changed"] = a.colours_changed;
   json["colours_changed_8"] = a.colours_changed_8;
   json["psnr_db"] = finite(a.psnr);
+  json["ssim"] = a.ssim;
   json["within_bound"] = a.within_bound();
   json["coverage_fallbacks"] = effort.coverage_fallbacks;
   json["depth_fallbacks"] = effort.depth_fallbacks;
@@ -57,22 +58,22 @@ Json end_to_end_json(const EndToEndVerdict& v, const EndToEndTruth& truth) {
   return json;
 }
 
-Json rays_json(const RayComparison& c, const RayCastPicture& rays, bool robust) {
+std::string place(std::int64_t pixel, int width) {
+  return fmt::format("x={} y={}", pixel % width, pixel / width);
+}
+
+Json rays_json(const RayComparison& c, const RayCastPicture& rays, int width) {
   Json json;
   json["version"] = embree_version();
-  json["robust"] = robust;
   json["identical"] = c.identical;
   json["edge_ties"] = c.edge_ties;
   json["depth_ties"] = c.depth_ties;
   json["errors"] = c.errors;
+  json["first_error"] = c.errors > 0 ? Json(place(c.worst_pixel, width)) : Json();
   json["max_depth_difference"] = finite(c.max_depth_difference);
   json["build_ms"] = rays.build_seconds * 1e3;
   json["trace_ms"] = rays.trace_seconds * 1e3;
   return json;
-}
-
-std::string place(std::int64_t pixel, int width) {
-  return fmt::format("x={} y={}", pixel % width, pixel / width);
 }
 
 }  // namespace
@@ -115,9 +116,11 @@ Json judge_picture(Judge& judge, const Picture& picture, const ModeInfo& mode) {
                     end_to_end.errors, place(end_to_end.worst_pixel, settings.width));
 
   if (has_embree()) {
-    json["embree"] = rays_json(judge.against_rays(picture, mode), judge.rays(false), false);
+    for (const bool robust : {false, true})
+      json[robust ? "embree_robust" : "embree"] =
+          rays_json(judge.against_rays(picture, mode, robust), judge.rays(robust), settings.width);
   } else {
-    json["embree"] = {{"skipped", embree_version()}};
+    json["embree"] = json["embree_robust"] = {{"skipped", embree_version()}};
   }
   json["bound"] = {{"bounded", mode.numbers.bounded}, {"text", mode.bound}, {"source", mode.bound_source}};
   json["failure"] = failure.empty() ? Json() : Json(failure);

@@ -109,8 +109,7 @@ Json Verifier::judge(const Point& point, const Scene& scene) {
   verify["conforms"] = drawn.differing == 0;
   verify["checked_against"] = "scalar specification of the mode; screen triangles in order and permuted";
   verify["differing_pixels"] = drawn.differing;
-  for (const char* verdict : {"oracle", "end_to_end", "embree", "bound"})
-    verify[verdict] = expect.verdicts.at(verdict);
+  for (const char* verdict : kVerdicts) verify[verdict] = expect.verdicts.at(verdict);
   if (drawn.differing != 0)
     answer["failure"] = fmt::format("{} of {} pixels differ from the specification of {}", drawn.differing,
                                     settings.pixels(), point.numeric);

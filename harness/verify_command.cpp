@@ -100,8 +100,7 @@ Json verify_row(const std::string& kernel, const Picture& specification, const J
   Json& verify = row["verify"];
   verify["conforms"] = differing == 0;
   verify["differing_pixels"] = differing;
-  for (const char* verdict : {"oracle", "end_to_end", "embree", "bound"})
-    verify[verdict] = verdicts.at(verdict);
+  for (const char* verdict : kVerdicts) verify[verdict] = verdicts.at(verdict);
   row["failure"] =
       differing == 0
           ? verdicts.at("failure")

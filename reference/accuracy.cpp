@@ -12,6 +12,7 @@
 #include "reference/bands.h"
 #include "reference/bounded_triangle.h"
 #include "reference/silhouette.h"
+#include "reference/similarity.h"
 
 namespace rasterbench {
 namespace {
@@ -97,10 +98,10 @@ struct Tally {
 };
 
 template <class Real>
-class Judge {
+class PictureJudge {
  public:
-  Judge(const JudgedPicture& picture, const OracleInput<Real>& input, const OracleImage& oracle,
-        const Camera& camera, const ModeBound& bound)
+  PictureJudge(const JudgedPicture& picture, const OracleInput<Real>& input, const OracleImage& oracle,
+               const Camera& camera, const ModeBound& bound)
       : picture_(picture),
         input_(input),
         oracle_(oracle),
@@ -334,7 +335,7 @@ Accuracy measure_accuracy(const JudgedPicture& picture, const OracleInput<Real>&
   checked_bytes(pixels, sizeof(PixelClass), "the classes of the pixels");
 
   std::vector<PixelClass> classes(pixels, PixelClass::kSame);
-  const Tally tally = Judge<Real>(picture, input, oracle, camera, bound).judge(classes, threads);
+  const Tally tally = PictureJudge<Real>(picture, input, oracle, camera, bound).judge(classes, threads);
   Accuracy accuracy = tally.sums;
   accuracy.pixels = static_cast<std::int64_t>(pixels);
   accuracy.worst_distance = tally.worst_distance;
@@ -342,6 +343,7 @@ Accuracy measure_accuracy(const JudgedPicture& picture, const OracleInput<Real>&
   accuracy.predicted = bound.bounded ? predict_wrong(input, oracle, bound, threads).pixels : -1;
   accuracy.silhouette_hausdorff = silhouette_distance(picture.ids, oracle.ids, input.width, input.height);
   compare_colours(picture.colours, oracle_colours, accuracy);
+  accuracy.ssim = structural_similarity(picture.colours, oracle_colours, input.width, input.height);
   return accuracy;
 }
 

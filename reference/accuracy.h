@@ -45,6 +45,7 @@ struct Accuracy {
   std::int64_t colours_changed = 0;     ///< pixels with a channel that differs
   std::int64_t colours_changed_8 = 0;   ///< with a channel that differs by more than 8
   double psnr = 0;                      ///< of the colours, decibels; infinite where they are equal
+  double ssim = 1;                      ///< of the colours; see similarity.h
   /// Index of the wrong pixel farthest from its edge or, where no coverage is wrong, of the largest gap
   /// between the exact depths of the drawn triangle and the owner; -1 where nothing is wrong. Exact ties come
   /// last.

@@ -16,9 +16,10 @@ using reference::Footprint;
 constexpr double kStep =
     0x1p-24;  // depths are judged in this unit: pictures hold them as floats, most of them near 1
 
-class Judge {
+class PixelComparer {
  public:
-  Judge(std::span<const Triangle> triangles, const Camera& camera, NearRule near_rule, const ModeBound& bound)
+  PixelComparer(std::span<const Triangle> triangles, const Camera& camera, NearRule near_rule,
+                const ModeBound& bound)
       : triangles_(triangles), camera_(camera), near_rule_(near_rule), bound_(bound), cache_(1 << 12) {}
 
   // Of equal ids. The truth is asked too, so that an error of either computation shows.
@@ -76,7 +77,7 @@ Comparison compare_with_double(const IdImage& truth, std::span<const std::int32_
   Comparison result;
   result.pixels = static_cast<std::int64_t>(pixels);
   result.verdicts.assign(pixels, PixelVerdict::kIdentical);
-  Judge judge(triangles, camera, near_rule, bound);
+  PixelComparer judge(triangles, camera, near_rule, bound);
   for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
     const double x = static_cast<double>(pixel % width) + 0.5, y = static_cast<double>(pixel / width) + 0.5;
     const std::int32_t drawn = ids[pixel], expected = truth.ids[pixel];

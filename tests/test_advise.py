@@ -132,7 +132,9 @@ def test_render_explains_what_it_leaves_out(teapot: SmallScene, tmp_path: Path) 
     (["--max-wrong", "1", "--size", "0x10"], ["--size", "width"]),
     (["--max-wrong", "1", "--fill", "open"], ["--fill", "open"]),
     (["--max-wrong", "1", "--near", "cut"], ["--near", "cut"]),
+    (["--max-wrong", "9" * 20], ["--max-wrong", "2^63"]),
     (["--max-wrong", "1", "--seconds", "0"], ["--seconds"]),
+    (["--max-wrong", "1", "--seconds", "nan"], ["--seconds", "nan"]),
     (["--max-wrong", "1", "--threads", "0"], ["--threads"]),
     (["--max-wrong", "1", "no_such.txt"], ["no_such.txt"]),
 ], ids=" ".join)

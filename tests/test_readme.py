@@ -67,6 +67,7 @@ TABLE: list[tuple[str, Shorten]] = [
     (r"scripts/study( .*)?", study_of_the_script),
     (PRODUCT + r"rasterbench study .*", planned_only),
     (PRODUCT + r"(rasterbench (render|list|scene|verify|advise|extremes|stability|fuzz|--help|--version)|graphics)\b.*", as_it_stands),
+    (r"scripts/python -m analysis stability .*", as_it_stands),
     (r"scripts/python -m analysis report .*", report_of_a_small_study),
     (r"cmake --preset \S+|cmake --build --preset \S+", presets_that_there_are),
 ]

@@ -82,15 +82,15 @@ RECORD = {"schema": WHOLE, "id": TEXT, "name": TEXT, "config": dict, "status": T
           "samples_ms": LIST, "stages_ms": dict, "median_ms": (*NUMBER, NULL), "interval_ms": (LIST, NULL), "p95_ms": (*NUMBER, NULL),
           "min_ms": (*NUMBER, NULL), "max_ms": (*NUMBER, NULL), "stop": (TEXT, NULL), "verify": (dict, NULL), "work": (dict, NULL),
           "threads_observed": (WHOLE, NULL), "per_thread": LIST, "context": TEXT}
-VERIFY = {"conforms": bool, "checked_against": TEXT, "differing_pixels": WHOLE, "oracle": (dict, NULL), "end_to_end": dict, "embree": dict,
+VERIFY = {"conforms": bool, "checked_against": TEXT, "differing_pixels": WHOLE, "oracle": (dict, NULL), "end_to_end": dict, "embree": dict, "embree_robust": dict,
           "bound": dict}
 ORACLE = {"renderer": TEXT, "within_bound": bool, "seconds": NUMBER} | dict.fromkeys(
     ["pixels", "wrong", "false_positives", "false_negatives", "exact_ties", "edge", "depth", "unexplained", "depth_out_of_bound", "unbounded", "predicted",
      "colours_changed", "colours_changed_8", "coverage_fallbacks", "depth_fallbacks"], WHOLE) | dict.fromkeys(
-    ["worst_distance_px", "max_depth_error_steps", "max_depth_error_world", "silhouette_hausdorff_px", "psnr_db"], (*NUMBER, NULL))
+    ["ssim", "worst_distance_px", "max_depth_error_steps", "max_depth_error_world", "silhouette_hausdorff_px", "psnr_db"], (*NUMBER, NULL))
 END_TO_END = {"renderer": TEXT, "max_depth_error_steps": (*NUMBER, NULL), "seconds": NUMBER} | dict.fromkeys(
     ["pixels", "identical", "wrong", "ambiguous", "edge_ties", "depth_ties", "unbounded", "errors", "multiprecision_pixels"], WHOLE)
-EMBREE = {"version": TEXT, "robust": bool, "max_depth_difference": (*NUMBER, NULL), "build_ms": NUMBER, "trace_ms": NUMBER} | dict.fromkeys(
+EMBREE = {"version": TEXT, "first_error": (TEXT, NULL), "max_depth_difference": (*NUMBER, NULL), "build_ms": NUMBER, "trace_ms": NUMBER} | dict.fromkeys(
     ["identical", "edge_ties", "depth_ties", "errors"], WHOLE)
 BOUND = {"bounded": bool, "text": TEXT, "source": TEXT}
 WORK = {"triangles": WHOLE, "drawn": WHOLE, "pieces": WHOLE, "rejected": dict, "near_clipped": WHOLE, "guard_clipped": WHOLE,
@@ -122,8 +122,9 @@ def test_records_have_the_documented_keys_and_types(study: Study) -> None:
             if r["verify"]["oracle"] is not None:
                 obey(r["verify"]["oracle"], ORACLE, r["name"], optional=("wrong_on_snapped", "edge_on_snapped"))
             obey(r["verify"]["end_to_end"], END_TO_END, r["name"])
-            if "skipped" not in r["verify"]["embree"]:
-                obey(r["verify"]["embree"], EMBREE, r["name"])
+            for rays in ("embree", "embree_robust"):
+                if "skipped" not in r["verify"][rays]:
+                    obey(r["verify"][rays], EMBREE, r["name"])
             obey(r["verify"]["bound"], BOUND, r["name"])
             obey(r["work"], WORK, r["name"])
             obey(r["work"]["rejected"], REJECTED, r["name"])
@@ -186,7 +187,8 @@ def test_good_points_are_verified(study: Study) -> None:
         assert o["wrong"] == o["exact_ties"] + o["edge"] + o["depth"] + o["unbounded"]
         e = v["end_to_end"]
         assert e["errors"] == 0 and e["identical"] + e["ambiguous"] + e["wrong"] == pixels
-        assert sum(v["embree"].get(kind, 0) for kind in ("identical", "edge_ties", "depth_ties", "errors")) in (0, pixels)
+        for rays in ("embree", "embree_robust"):
+            assert sum(v[rays].get(kind, 0) for kind in ("identical", "edge_ties", "depth_ties", "errors")) in (0, pixels)
         assert 0 < w["drawn"] <= w["triangles"] and w["fragments_tested"] >= w["fragments_covered"] >= w["covered_pixels"] > 100 and w["bytes"] > 0
         assert w["drawn"] + sum(w["rejected"].values()) == w["triangles"]
         assert r["threads_observed"] == r["config"]["threads"] == len(r["per_thread"])

@@ -53,8 +53,9 @@ def test_every_mode_conforms_and_keeps_its_bound(scene: str, request: pytest.Fix
             assert oracle["wrong"] == oracle["predicted"] == 0
         if numeric.startswith("fixed"):
             assert oracle["edge_on_snapped"] == 0, numeric
-        if "skipped" not in verify["embree"]:
-            assert verify["embree"]["errors"] == 0, numeric
+        for rays in (verify["embree"], verify["embree_robust"]):
+            if "skipped" not in rays:
+                assert rays["errors"] == 0 and rays["first_error"] is None and rays["identical"] > 0, numeric
 
 
 def test_a_kernel_that_does_not_conform_fails(teapot: SmallScene) -> None:
