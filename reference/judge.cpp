@@ -159,6 +159,9 @@ EndToEndVerdict Judge::against_truth(const Picture& picture, const ModeInfo& mod
       bool unbounded = false;
       if (geometry == nullptr) {
         reason = of_rays.verdicts[i];
+        // A cast depth that is rounded onto the far plane is not drawn.
+        const bool is_lost = picture.ids[i] < 0 && 1 - truth.truth.depths[i] <= 2 * mode.numbers.depth_unit;
+        if (reason == PixelVerdict::kError && is_lost) reason = PixelVerdict::kDepthTie;
       } else if (accuracy->classes[i] == PixelClass::kSame) {
         reason = geometry->verdicts[i];
       } else if (geometry->verdicts[i] != PixelVerdict::kError) {

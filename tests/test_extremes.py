@@ -136,3 +136,12 @@ def test_sweeps_are_written_line_by_line(tmp_path: Path) -> None:
 def test_mistakes_of_stability_are_refused(options: list[object], words: list[str], tmp_path: Path) -> None:
     refused(run("stability", *options, cwd=tmp_path), *words)
     assert os.listdir(tmp_path) == []
+
+
+def test_rays_are_taken_to_the_extremes_too() -> None:
+    """ray_cast is a kernel and a mode of its own: by default it stands in a table beside the others'."""
+    found = extremes(modes=["ray_cast"])
+    assert {entry["kernel"] for entry in found if entry["numeric"]} == {"ray_cast"}
+    assert {entry["number"] for entry in found} >= set(range(1, 46))
+    assert not [entry for entry in found if entry["verdict"] == "WRONG"]
+    assert sum(entry["verdict"] == "exact" for entry in found) > 20
