@@ -28,6 +28,14 @@ function(rasterbench_library name)
   target_link_libraries(${name} PUBLIC rasterbench_options rasterbench_native)
 endfunction()
 
+# rasterbench_lanes(FOLDER sources...): sources that Highway compiles for each instruction set, as objects of FOLDER.
+function(rasterbench_lanes folder)
+  add_library(${folder}_lanes OBJECT ${ARGN})
+  target_link_libraries(${folder}_lanes PUBLIC rasterbench_options PkgConfig::hwy)
+  target_compile_definitions(${folder}_lanes PRIVATE HWY_DISABLED_TARGETS=HWY_SSSE3)  # no instruction set of the axis
+  target_sources(${folder} PUBLIC $<TARGET_OBJECTS:${folder}_lanes>)
+endfunction()
+
 # rasterbench_test(FOLDER sources... LIBRARIES folders...): FOLDER_test, the unit tests that sit beside the sources.
 function(rasterbench_test folder)
   cmake_parse_arguments(ARG "" "" "LIBRARIES" ${ARGN})

@@ -67,6 +67,13 @@ TEST(Sweeps, FloatDepthBreaksWhereTheFarPlaneIsFar) {
     EXPECT_FALSE(point("near_far", 1e18, mode).is_broken()) << mode;
 }
 
+TEST(Sweeps, InverseWBreaksWithinItsBoundWhereThePlanesAreClose) {
+  // A narrow view from far away: 1/w hardly changes between the planes, and its rounding is large in d.
+  const SweepPoint at = point("field_of_view", 1e-3, "filtered-inverse_w");
+  EXPECT_TRUE(at.is_broken());
+  EXPECT_EQ(at.unexplained, 0);
+}
+
 TEST(Sweeps, FixedPointBreaksWhereTrianglesAreSmall) {
   EXPECT_FALSE(point("triangle_size", 100, "fixed_12").is_broken());
   EXPECT_TRUE(point("triangle_size", 1e-2, "fixed_4").is_broken());

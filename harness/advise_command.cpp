@@ -100,6 +100,7 @@ void add_advise_command(CLI::App& app, Outcome& outcome) {
     if (!o->size.empty()) std::tie(settings.width, settings.height) = parse_size(o->size, "--size");
     settings.fill = parse_fill(o->fill, "--fill");
     settings.geometry.near_rule = parse_near(o->near_rule, "--near");
+    settings.geometry.isa = best_isa();
     DrawOptions draw;
     draw.threads = o->threads;
     const int threads = execution_of(draw).threads;

@@ -41,6 +41,7 @@ struct DrawOptions {
   std::string cull = "none";
   int tile = 64;
   std::string generality = "minimal";
+  std::string isa = "best";
 };
 
 /// The execution that the options ask for; throws InputError.

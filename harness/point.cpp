@@ -26,6 +26,10 @@ int parse_integer(std::string_view text, int low, int high, const std::string& f
 
 constexpr int kMaxChunk = 1 << 30;
 
+/// Whether the frame has loops that are compiled for each instruction set: the geometry stage of screen
+/// triangles.
+bool is_vectorised(const std::string& numeric) { return find_mode(numeric)->has_screen_triangles; }
+
 }  // namespace
 
 SceneReference parse_scene_reference(const std::string& text) {
@@ -51,6 +55,7 @@ FrameSettings Point::settings() const {
   settings.geometry.near_rule = near_rule;
   settings.tile = tile;
   settings.generality = generality;
+  settings.geometry.isa = isa;
   return settings;
 }
 
@@ -66,6 +71,7 @@ std::string point_name(const Point& p) {
   if (find_kernel(p.kernel).info().has_tiles && p.tile != 64) name += fmt::format("/tile:{}", p.tile);
   if (p.cache != "warm") name += "/cache:" + p.cache;
   if (p.generality != Generality::kMinimal) name += "/generality:full";
+  if (is_vectorised(p.numeric) && p.isa != best_isa()) name += fmt::format("/isa:{}", to_string(p.isa));
   return name;
 }
 
@@ -85,7 +91,7 @@ Json point_config(const Point& p) {
   config["wait_policy"] = p.environment.wait_policy;
   config["runtime"] = p.environment.runtime;
   config["tile"] = find_kernel(p.kernel).info().has_tiles ? Json(p.tile) : Json();
-  config["isa"] = "baseline";
+  config["isa"] = to_string(is_vectorised(p.numeric) ? p.isa : Isa::kBaseline);
   config["output"] = "rgba8+f32";
   config["cache"] = p.cache;
   config["generality"] = kGeneralities[p.generality == Generality::kFull];
@@ -117,6 +123,7 @@ Point point_from_json(const Json& json) {
   p.tile = json.at("tile");
   p.cache = json.at("cache");
   p.generality = parse_generality(json.at("generality"), "generality");
+  p.isa = parse_isa(json.at("isa"), "isa");
   return p;
 }
 

@@ -58,6 +58,7 @@ struct Point {
   int tile = 64;               ///< pixels; counts only for kernels that have tiles
   std::string cache = "warm";  ///< warm, or cold: the caches are swept before each sample
   Generality generality = Generality::kMinimal;
+  Isa isa = best_isa();
 
   FrameSettings settings() const;
 };

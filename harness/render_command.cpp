@@ -56,6 +56,9 @@ void draw(const Drawing& drawing, const DrawOptions& options) {
   settings.geometry.cull_back_faces = options.cull == "back";
   settings.tile = options.tile;
   settings.generality = parse_generality(options.generality, "--generality");
+  settings.geometry.isa = parse_isa(options.isa, "--isa");
+  if (!is_supported(settings.geometry.isa))
+    throw InputError({.field = "--isa"}, fmt::format("this CPU has no {}", options.isa));
   if (!options.size.empty()) std::tie(settings.width, settings.height) = parse_size(options.size, "--size");
   find_kernel(options.kernel).variant(options.numeric);
   const ExecutionConfig execution = execution_of(options);
@@ -132,6 +135,10 @@ void add_draw_options(CLI::App& command, DrawOptions& o) {
   command
       .add_option("--generality", o.generality,
                   "tests of the geometry stage: minimal (those that this scene needs) or full (all)")
+      ->capture_default_str();
+  command
+      .add_option("--isa", o.isa,
+                  "instruction set of the vectorised loops: baseline, sse4, avx2, avx512, or best")
       ->capture_default_str();
 }
 

@@ -32,6 +32,7 @@ std::string reason_to_skip(const Point& point, const Scene& scene, const Samplin
                        available_cpus());
   if (point.execution.backend == "tbb" && point.environment != Environment{})
     return "binding, wait policy and runtime are OpenMP's; OMP_PROC_BIND would narrow oneTBB to one worker";
+  if (!is_supported(point.isa)) return fmt::format("this CPU has no {}", to_string(point.isa));
   if (!find_mode(point.numeric)->has_screen_triangles) {
     try {
       check_ray_cast_settings(point.settings());

@@ -291,6 +291,7 @@ Sweep read_sweep(const toml::table& table, const std::string& file, const std::f
   reader.words("cache", kCaches, "warm", sweep.caches);
   reader.strings("generality", sweep.generalities,
                  [](const std::string& s) { return parse_generality(s, "generality"); });
+  reader.strings("isa", sweep.isas, [](const std::string& s) { return parse_isa(s, "isa"); });
   reader.reject_unknown_keys("[[sweep]]");
 
   if (sweep.kernels.empty()) reader.fail(table, "kernel", "is missing from this [[sweep]]");
@@ -300,6 +301,7 @@ Sweep read_sweep(const toml::table& table, const std::string& file, const std::f
   if (sweep.threads.empty()) sweep.threads = {available_cpus()};
   if (sweep.tiles.empty()) sweep.tiles.push_back(64);
   if (sweep.generalities.empty()) sweep.generalities.push_back(Generality::kMinimal);
+  if (sweep.isas.empty()) sweep.isas.push_back(best_isa());
   return sweep;
 }
 
@@ -366,6 +368,15 @@ std::vector<Sweep> read_sweeps(const std::filesystem::path& path, const std::str
   return all;
 }
 
+/// The axes of the geometry stage; one combination where there is no such stage.
+std::vector<std::pair<Generality, Isa>> of_geometry(const Sweep& sweep, const std::string& numeric) {
+  if (!find_mode(numeric)->has_screen_triangles) return {{Generality::kMinimal, Isa::kBaseline}};
+  std::vector<std::pair<Generality, Isa>> all;
+  for (const Generality generality : sweep.generalities)
+    for (const Isa isa : sweep.isas) all.emplace_back(generality, isa);
+  return all;
+}
+
 void span_points(const Sweep& sweep, const std::map<std::string, Scene>& scenes,
                  const std::function<void(const Point&)>& visit) {
   for (const SceneReference& scene : sweep.scenes) {
@@ -383,12 +394,9 @@ void span_points(const Sweep& sweep, const std::map<std::string, Scene>& scenes,
                        execution.backend == "serial" ? std::vector<int>{1} : sweep.threads)
                     for (const Environment& environment : sweep.environments)
                       for (const std::string& cache : sweep.caches)
-                        for (const Generality generality :
-                             find_mode(numeric)->has_screen_triangles
-                                 ? sweep.generalities
-                                 : std::vector<Generality>{Generality::kMinimal}) {
-                          Point point{scene,     width,     height,      kernel, numeric, fill,
-                                      near_rule, execution, environment, tile,   cache,   generality};
+                        for (const auto& [generality, isa] : of_geometry(sweep, numeric)) {
+                          Point point{scene,     width,       height, kernel, numeric,    fill, near_rule,
+                                      execution, environment, tile,   cache,  generality, isa};
                           point.execution.threads = threads;
                           visit(point);
                         }

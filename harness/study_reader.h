@@ -24,6 +24,7 @@ struct Sweep {
   std::vector<int> tiles;
   std::vector<std::string> caches;
   std::vector<Generality> generalities;
+  std::vector<Isa> isas;
 };
 
 /// Name, question, seed and [sampling] of a study file, and its text; no points yet.

@@ -117,6 +117,7 @@ int verify_scene(const VerifyOptions& options, const std::string& model, Json& r
   if (!options.size.empty()) std::tie(settings.width, settings.height) = parse_size(options.size, "--size");
   settings.fill = parse_fill(options.fill, "--fill");
   settings.geometry.near_rule = parse_near(options.near_rule, "--near");
+  settings.geometry.isa = best_isa();
   std::pair<int, int> pixel{-1, -1};
   if (!options.explain.empty()) pixel = parse_pixel(options.explain, settings.width, settings.height);
 

@@ -11,38 +11,40 @@
 
 namespace rasterbench {
 
-/// Set-up triangles and, per cell, the indices of those whose box touches it. Kept between frames to reuse
-/// its memory.
+/// Cells of a grid over the image and, per cell, the indices of the boxes that touch it. Kept between frames
+/// to reuse its memory.
 ///
-/// Two parallel passes over the same blocks of triangles: count per (block, cell), prefix sum, fill. No
-/// atomics, and the order within a cell is the triangles' order whatever thread ran what.
-template <NumericMode Mode>
-class Bins {
+/// Two parallel passes over the same blocks of boxes: count per (block, cell), prefix sum, fill. No atomics,
+/// and the order within a cell is the order of the boxes whatever thread ran what.
+class CellLists {
  public:
-  /// Bins `in` into cells of cell_width x cell_height pixels.
-  void build(const StagedTriangles<Mode>& in, int cell_width, int cell_height, Execution& execution) {
+  /// Lists `n` boxes in cells of cell_width x cell_height pixels of an image of width x height.
+  /// prepare(begin, end) is called once for each block, by the thread that then asks for its boxes; box(i) is
+  /// called twice for each i < n, after that.
+  template <class Prepare, class Box>
+  void build(std::int64_t n, int cell_width, int cell_height, int width, int height, Execution& execution,
+             Prepare prepare, Box box) {
     cell_width_ = cell_width;
     cell_height_ = cell_height;
-    columns_ = (in.settings.width + cell_width - 1) / cell_width;
-    rows_ = (in.settings.height + cell_height - 1) / cell_height;
-    width_ = in.settings.width;
-    height_ = in.settings.height;
-    const std::int64_t cells = std::int64_t{columns_} * rows_;
+    columns_ = (width + cell_width - 1) / cell_width;
+    rows_ = (height + cell_height - 1) / cell_height;
+    image_ = {0, 0, width, height};
+    fill_cell_of(column_of_, width, cell_width);
+    fill_cell_of(row_of_, height, cell_height);
+    const std::int64_t cells = this->cells();
     // Enough blocks to balance any number of threads that a machine has, few enough that the counters stay
     // small.
     const std::int64_t blocks =
-        std::clamp<std::int64_t>(std::min(in.size() / 64, (std::int64_t{1} << 22) / cells), 1, 256);
-    const auto block_begin = [&](std::int64_t block) { return in.size() * block / blocks; };
-    prepared_.require(static_cast<std::size_t>(in.size()), "the array of prepared triangles");
+        std::clamp<std::int64_t>(std::min(n / 64, (std::int64_t{1} << 22) / cells), 1, 256);
+    const auto block_begin = [&](std::int64_t block) { return n * block / blocks; };
     cursors_.require(static_cast<std::size_t>(blocks * cells), "the counters of the bins");
 
     execution.uniform_loop(blocks, [&](std::int64_t block, int) {
       std::int64_t* counts = cursors_.data() + block * cells;
       std::fill_n(counts, cells, 0);
-      for (std::int64_t i = block_begin(block); i < block_begin(block + 1); ++i) {
-        prepared_[static_cast<std::size_t>(i)] = in.prepare(i);
-        for_each_cell(prepared_[static_cast<std::size_t>(i)].box, [&](std::int64_t cell) { ++counts[cell]; });
-      }
+      prepare(block_begin(block), block_begin(block + 1));
+      for (std::int64_t i = block_begin(block); i < block_begin(block + 1); ++i)
+        for_each_cell(box(i), [&](std::int64_t cell) { ++counts[cell]; });
     });
 
     // Exclusive prefix sum in the order (cell, block): a count becomes the place of the block's first entry
@@ -62,14 +64,15 @@ class Bins {
     execution.uniform_loop(blocks, [&](std::int64_t block, int) {
       std::int64_t* cursors = cursors_.data() + block * cells;
       for (std::int64_t i = block_begin(block); i < block_begin(block + 1); ++i)
-        for_each_cell(prepared_[static_cast<std::size_t>(i)].box, [&](std::int64_t cell) {
+        for_each_cell(box(i), [&](std::int64_t cell) {
           entries_[static_cast<std::size_t>(cursors[cell]++)] = static_cast<std::uint32_t>(i);
         });
     });
   }
 
   std::size_t bytes() const {
-    return prepared_.bytes() + cursors_.bytes() + begin_.size() * sizeof(begin_[0]) + entries_.bytes();
+    return cursors_.bytes() + begin_.size() * sizeof(begin_[0]) + entries_.bytes() +
+           (column_of_.size() + row_of_.size()) * sizeof(column_of_[0]);
   }
 
   std::int64_t cells() const { return std::int64_t{columns_} * rows_; }
@@ -78,32 +81,75 @@ class Bins {
   PixelBox box(std::int64_t cell) const {
     const auto column = static_cast<std::int32_t>(cell % columns_),
                row = static_cast<std::int32_t>(cell / columns_);
-    return {column * cell_width_, row * cell_height_, std::min((column + 1) * cell_width_, width_),
-            std::min((row + 1) * cell_height_, height_)};
+    return intersect(image_, {column * cell_width_, row * cell_height_, (column + 1) * cell_width_,
+                              (row + 1) * cell_height_});
   }
+
+  /// The indices of the boxes that touch `cell`, in their order.
+  std::span<const std::uint32_t> entries(std::int64_t cell) const {
+    const auto first = begin_[static_cast<std::size_t>(cell)],
+               last = begin_[static_cast<std::size_t>(cell) + 1];
+    return {entries_.data() + first, static_cast<std::size_t>(last - first)};
+  }
+
+ private:
+  /// The cell of each pixel: looked up, because four divisions a box took longer than counting it.
+  static void fill_cell_of(std::vector<std::int32_t>& cells, int pixels, int pixels_of_cell) {
+    cells.resize(static_cast<std::size_t>(pixels));
+    for (int pixel = 0; pixel < pixels; ++pixel)
+      cells[static_cast<std::size_t>(pixel)] = pixel / pixels_of_cell;
+  }
+
+  template <class Visit>
+  void for_each_cell(const PixelBox& whole, Visit visit) const {
+    const PixelBox box = intersect(whole, image_);
+    if (box.empty()) return;
+    const auto of = [](const std::vector<std::int32_t>& cells, std::int32_t pixel) {
+      return cells[static_cast<std::size_t>(pixel)];
+    };
+    const std::int32_t last_row = of(row_of_, box.y1 - 1), last_column = of(column_of_, box.x1 - 1);
+    for (std::int64_t row = of(row_of_, box.y0); row <= last_row; ++row)
+      for (std::int64_t column = of(column_of_, box.x0); column <= last_column; ++column)
+        visit(row * columns_ + column);
+  }
+
+  int cell_width_ = 1, cell_height_ = 1, columns_ = 0, rows_ = 0;
+  PixelBox image_;
+  std::vector<std::int32_t> column_of_, row_of_;  // per pixel of a row, of a column
+  Buffer<std::int64_t> cursors_;                  // blocks x cells
+  std::vector<std::int64_t> begin_;               // cells + 1
+  Buffer<std::uint32_t> entries_;
+};
+
+/// Set-up triangles and, per cell, those whose box touches it.
+template <NumericMode Mode>
+class Bins {
+ public:
+  /// Bins `in` into cells of cell_width x cell_height pixels.
+  void build(const StagedTriangles<Mode>& in, int cell_width, int cell_height, Execution& execution) {
+    prepared_.require(static_cast<std::size_t>(in.size()), "the array of prepared triangles");
+    lists_.build(
+        in.size(), cell_width, cell_height, in.settings.width, in.settings.height, execution,
+        [&](std::int64_t begin, std::int64_t end) {
+          for (std::int64_t i = begin; i < end; ++i) prepared_[static_cast<std::size_t>(i)] = in.prepare(i);
+        },
+        [&](std::int64_t i) { return prepared_[static_cast<std::size_t>(i)].box; });
+  }
+
+  std::size_t bytes() const { return prepared_.bytes() + lists_.bytes(); }
+  std::int64_t cells() const { return lists_.cells(); }
+  /// Pixels of a cell, cut to the image.
+  PixelBox box(std::int64_t cell) const { return lists_.box(cell); }
 
   /// Calls visit(prepared) for each triangle whose box touches `cell`, in their order.
   template <class Visit>
   void for_each_triangle(std::int64_t cell, Visit visit) const {
-    const auto first = begin_[static_cast<std::size_t>(cell)],
-               last = begin_[static_cast<std::size_t>(cell) + 1];
-    for (auto e = first; e < last; ++e) visit(prepared_[entries_[static_cast<std::size_t>(e)]]);
+    for (const std::uint32_t index : lists_.entries(cell)) visit(prepared_[index]);
   }
 
  private:
-  template <class Visit>
-  void for_each_cell(const PixelBox& box, Visit visit) const {
-    if (box.empty()) return;
-    for (std::int64_t row = box.y0 / cell_height_; row <= (box.y1 - 1) / cell_height_; ++row)
-      for (std::int64_t column = box.x0 / cell_width_; column <= (box.x1 - 1) / cell_width_; ++column)
-        visit(row * columns_ + column);
-  }
-
-  int cell_width_ = 1, cell_height_ = 1, columns_ = 0, rows_ = 0, width_ = 0, height_ = 0;
   Buffer<typename Mode::Prepared> prepared_;
-  Buffer<std::int64_t> cursors_;     // blocks x cells
-  std::vector<std::int64_t> begin_;  // cells + 1
-  Buffer<std::uint32_t> entries_;    // indices into prepared_
+  CellLists lists_;
 };
 
 }  // namespace rasterbench

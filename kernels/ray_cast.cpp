@@ -73,7 +73,7 @@ class RayCast final : public Renderer {
       const std::int64_t width = settings_.width;
       execution_->uniform_loop(settings_.height, [&](std::int64_t y, int) {
         resolve_row<Keys>(keys_.data() + y * width, settings_.width, scene_, settings_.tie, DepthMap{},
-                          colours_.data() + y * width, depths_.data() + y * width);
+                          Isa::kBaseline, colours_.data() + y * width, depths_.data() + y * width);
       });
     });
     return report_;

@@ -127,7 +127,7 @@ class FrameRenderer final : public Renderer {
     report_.raster_tally.assign(execution_->tally().begin(), execution_->tally().end());
     report_.seconds.resolve = timed([&] {
       execution_->uniform_loop(settings_.height, [&](std::int64_t y, int) {
-        resolve_row<Mode>(visibility.row(y), width, scene_, settings_.tie, depth_map_,
+        resolve_row<Mode>(visibility.row(y), width, scene_, settings_.tie, depth_map_, settings_.geometry.isa,
                           colours_.data() + y * width, depths_.data() + y * width);
       });
     });

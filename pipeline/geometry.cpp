@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 
 #include "base/error.h"
 #include "pipeline/corner.h"
+#include "pipeline/geometry_lanes.h"
 
 namespace rasterbench {
 namespace {
@@ -233,10 +235,10 @@ void transform_triangles(std::span<const Triangle> triangles, std::int32_t first
                          GeometryCounts& counts) {
   counts.triangles += static_cast<std::int64_t>(triangles.size());
   Passage passage{transform, options, counts};
-  for (std::size_t i = 0; i < triangles.size(); ++i) {
+  const auto one_by_one = [&](std::size_t i) {
     if (!passage.run(triangles[i])) {
       slots[i] = {{}, {}, {}, -1};
-      continue;
+      return;
     }
     const std::int32_t id = first_id + static_cast<std::int32_t>(i);
     ScreenPolygon& polygon = passage.screen;
@@ -250,6 +252,13 @@ void transform_triangles(std::span<const Triangle> triangles, std::int32_t first
                   polygon.end());
     slots[i] = piece<Real>(p[0], p[1], p[2], id);
     for (std::size_t k = 3; k < polygon.size; ++k) extra.push_back(piece<Real>(p[0], p[k - 1], p[k], id));
+  };
+  for (std::size_t first = 0; first < triangles.size(); first += kMaxLaneTriangles) {
+    const std::size_t n = std::min<std::size_t>(kMaxLaneTriangles, triangles.size() - first);
+    std::uint64_t left = transform_in_lanes(triangles.data() + first, static_cast<std::int64_t>(n),
+                                            first_id + static_cast<std::int32_t>(first), transform, options,
+                                            slots + first, counts);
+    for (; left != 0; left &= left - 1) one_by_one(first + static_cast<std::size_t>(std::countr_zero(left)));
   }
 }
 

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "base/isa.h"
 #include "numeric/screen.h"
 #include "scene/camera.h"
 #include "scene/model.h"
@@ -46,6 +47,7 @@ struct GeometryOptions {
   NearRule near_rule = NearRule::kClip;
   bool cull_back_faces = false;  ///< back faces occlude by default (accuracy.md, section 1)
   SceneNeeds needs = {};         ///< all by default, which suits every scene
+  Isa isa = Isa::kBaseline;      ///< of the vectorised loops; never changes the result
 };
 
 /// What became of the triangles; the fields before `drawn` count triangles that draw nothing, each once.

@@ -1,10 +1,12 @@
 // The resolve stage: visibility buffer -> colours and depths. Shades visible triangles only.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 #include "numeric/mode.h"
 #include "pipeline/frame.h"
+#include "pipeline/shade_lanes.h"
 #include "scene/model.h"
 #include "scene/parameters.h"
 
@@ -19,28 +21,49 @@ inline std::uint32_t pack_rgba(const Rgb& colour) {
 /// each channel trunc(s C). In double, so that no float32 triangle overflows or loses its normal.
 std::uint32_t shade_flat(const Triangle& triangle, const Rgb& colour);
 
+/// Runs of pixels of a row that show one triangle, or the background. As many as a block of pixels can have.
+struct PixelRuns {
+  static constexpr int kBlock = 256;  // pixels: what a block needs stays in L1
+
+  int count = 0;
+  int begin[kBlock + 1];          ///< of each run, and where the last one ends
+  std::uint32_t colours[kBlock];  ///< of each run
+  std::uint32_t ids[kBlock];      ///< of the runs that show a triangle
+  int run_of[kBlock];             ///< the run of each of these ids
+  std::uint32_t shaded[kBlock];
+};
+
 /// Resolves row y: reads keys, writes colours and depths, `width` of each. A triangle is shaded once per run
 /// of its pixels. `map` takes the mode's depth values to d.
 template <NumericMode Mode>
 void resolve_row(const typename Mode::Key* keys, int width, const Scene& scene, TieRule tie,
-                 const DepthMap& map, std::uint32_t* colours, float* depths) {
+                 const DepthMap& map, Isa isa, std::uint32_t* colours, float* depths) {
   const auto& triangles = scene.model.triangles;
   const auto count = static_cast<std::int64_t>(triangles.size());
   const std::uint32_t background = pack_rgba(scene.parameters.background);
-  typename Mode::Key clear = Mode::kClear;
-  std::uint32_t shaded_rank = Mode::rank(clear);
-  std::uint32_t colour = background;
-  for (int x = 0; x < width; ++x) {
-    const auto& key = keys[x];
-    const std::uint32_t rank = Mode::rank(key);  // that of an empty pixel is no triangle's
-    if (rank != shaded_rank) {
-      shaded_rank = rank;
-      colour = rank == Mode::rank(clear)
-                   ? background
-                   : shade_flat(triangles[swap_rank(tie, count, rank)], scene.parameters.object);
+  const std::uint32_t empty = Mode::rank(Mode::kClear);  // no triangle's
+  PixelRuns runs;
+  for (int first = 0; first < width; first += PixelRuns::kBlock) {
+    const int end = std::min(width, first + PixelRuns::kBlock);
+    runs.count = 0;
+    std::size_t shaded = 0;
+    for (int x = first; x < end; ++x) {
+      const std::uint32_t rank = Mode::rank(keys[x]);
+      if (x > first && rank == Mode::rank(keys[x - 1])) continue;
+      if (rank == empty) {
+        runs.colours[runs.count] = background;
+      } else {
+        runs.ids[shaded] = swap_rank(tie, count, rank);
+        runs.run_of[shaded++] = runs.count;
+      }
+      runs.begin[runs.count++] = x;
     }
-    colours[x] = colour;
-    depths[x] = Mode::output_depth(key, map);
+    runs.begin[runs.count] = end;
+    shade_in_lanes(triangles, {runs.ids, shaded}, scene.parameters.object, runs.shaded, isa);
+    for (std::size_t i = 0; i < shaded; ++i) runs.colours[runs.run_of[i]] = runs.shaded[i];
+    for (int run = 0; run < runs.count; ++run)
+      std::fill(colours + runs.begin[run], colours + runs.begin[run + 1], runs.colours[run]);
+    for (int x = first; x < end; ++x) depths[x] = Mode::output_depth(keys[x], map);
   }
 }
 

@@ -124,12 +124,14 @@ TYPED_TEST(ResolveRow, MapsKeysToColoursAndDepths) {
 
   std::vector<std::uint32_t> colours(keys.size());
   std::vector<float> got_depths(keys.size(), -7.0f);
-  resolve_row<TypeParam>(keys.data(), width, scene, TieRule::kFirst, map, colours.data(), got_depths.data());
+  resolve_row<TypeParam>(keys.data(), width, scene, TieRule::kFirst, map, best_isa(), colours.data(),
+                         got_depths.data());
   EXPECT_EQ(colours, (std::vector<std::uint32_t>{b, of[0], of[0], of[1], b, b, of[2], of[0]}));
   expect_depths(got_depths);
 
   // The later triangle wins ties: rank r is triangle 2 - r.
-  resolve_row<TypeParam>(keys.data(), width, scene, TieRule::kLast, map, colours.data(), got_depths.data());
+  resolve_row<TypeParam>(keys.data(), width, scene, TieRule::kLast, map, best_isa(), colours.data(),
+                         got_depths.data());
   EXPECT_EQ(colours, (std::vector<std::uint32_t>{b, of[2], of[2], of[1], b, b, of[0], of[2]}));
   expect_depths(got_depths);
 }
@@ -139,7 +141,7 @@ TYPED_TEST(ResolveRow, WritesNoMoreThanItsRow) {
   std::array<std::uint32_t, 2> colours{7, 7};
   std::array<float, 2> depths{7, 7};
   resolve_row<TypeParam>(keys.data(), 1, TestFixture::scene(), TieRule::kFirst,
-                         map_of(TypeParam::kDepthFunction), colours.data(), depths.data());
+                         map_of(TypeParam::kDepthFunction), best_isa(), colours.data(), depths.data());
   EXPECT_EQ(colours, (std::array<std::uint32_t, 2>{rgba(0, 0, 0), 7}));
   EXPECT_NEAR(depths[0], 0.5, 0.5 * TypeParam::kInfo.numbers.depth_step);
   EXPECT_EQ(depths[1], 7);
@@ -152,7 +154,7 @@ TYPED_TEST(ResolveRow, ASceneWithoutTrianglesIsBackground) {
   for (const TieRule tie : {TieRule::kFirst, TieRule::kLast}) {
     std::array<std::uint32_t, 2> colours{};
     std::array<float, 2> depths{};
-    resolve_row<TypeParam>(keys.data(), 2, empty, tie, {-5, 3}, colours.data(), depths.data());
+    resolve_row<TypeParam>(keys.data(), 2, empty, tie, {-5, 3}, best_isa(), colours.data(), depths.data());
     EXPECT_EQ(colours, (std::array{TestFixture::kBackground, TestFixture::kBackground}));
     EXPECT_EQ(depths, (std::array{1.0f, 1.0f}));
   }

@@ -282,7 +282,7 @@ Polygon visible_part(const std::array<Corner, 3>& corners, double near_side, Nea
                          error(v.y, y) + bound.vertex_unit * std::abs(v.y) + bound.snap);
     // The kernel may cut at the guard band after the division, in pixels.
     if (std::max({k[0], k[1], k[2]}) < 1) v.reach += kGeometry * kGuardBand;
-    v.slack = error(v.d, z) + bound.vertex_unit * std::max(1.0, std::abs(v.d));
+    v.slack = error(v.d, z) + bound.vertex_unit * std::max(1.0, std::abs(v.d)) + bound.corner_depth_error;
     // A w that may be zero: the vertex may be anywhere.
     if (!(w.value > 2 * kGeometry * w.size)) v.reach = INFINITY;
     polygon.vertices.push_back(v);

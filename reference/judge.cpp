@@ -11,6 +11,16 @@ namespace {
 
 bool is_double(const ModeInfo& mode) { return mode.numbers.vertex_unit == 0x1p-53; }
 
+/// The rounding of a corner's depth value, in units of d: where the far plane is hardly farther than the near
+/// one, 1/w hardly changes between them.
+double corner_depth_error(const Camera& camera, const ModeInfo& mode) {
+  if (mode.depth_function == DepthFunction::kNdc) return 0;
+  const double largest =
+      mode.depth_function == DepthFunction::kReversed ? 1 : camera.far_plane / camera.near_plane;
+  constexpr double kDivision = 0x1p-47;  // of doubles, before it is rounded to the vertex format
+  return depth_map(camera, mode.depth_function).scale * largest * (mode.numbers.vertex_unit + kDivision);
+}
+
 /// Corners on a grid of 2 * snap pixels, ties to even: what fixed-point modes promise to draw exactly.
 std::vector<ScreenTriangle<float>> snapped(std::vector<ScreenTriangle<float>> triangles, double snap) {
   const auto on_grid = [&](float v) {
@@ -39,7 +49,9 @@ JudgedPicture judged(const Picture& picture) { return {picture.ids, picture.valu
 }  // namespace
 
 Judge::Judge(const Scene& scene, const FrameSettings& settings, int threads)
-    : scene_(scene), settings_(settings), camera_(sized_camera(scene, settings)), threads_(threads) {}
+    : scene_(scene), settings_(settings), camera_(sized_camera(scene, settings)), threads_(threads) {
+  settings_.geometry.isa = Isa::kBaseline;  // nothing vectorised takes part in a judgement
+}
 Judge::~Judge() = default;
 
 template <class Real>
@@ -129,8 +141,11 @@ const Comparison& Judge::oracle_against_truth(const ModeInfo& mode) {
                    return id < 0 ? 1.0f : static_cast<float>(map.offset + map.scale * value);
                  });
   // Exact arithmetic on rounded vertices: what is left of the footprint's tolerance is the vertices' own.
-  const ModeBound vertices{
-      .vertex_unit = mode.numbers.vertex_unit, .edge_unit = 0, .gradient_unit = 0, .depth_unit = 0};
+  const ModeBound vertices{.vertex_unit = mode.numbers.vertex_unit,
+                           .edge_unit = 0,
+                           .gradient_unit = 0,
+                           .depth_unit = 0,
+                           .corner_depth_error = corner_depth_error(camera_, mode)};
   return geometry_[key] = compare_with_double(truth().truth, exact.ids, depths, scene_.model.triangles,
                                               camera_, settings_.geometry.near_rule, vertices);
 }

@@ -33,8 +33,10 @@ Picture render_mode(const Scene& scene, const FrameSettings& settings) {
   checked_bytes(settings.pixels(), sizeof(typename Mode::Key) + 20, "the specification's picture");
   std::vector<ScreenTriangle<Real>> screen(triangles.size()), extra;
   const Camera camera = sized_camera(scene, settings);
-  transform_triangles<Real>(triangles, 0, make_screen_transform(camera, Mode::kDepthFunction),
-                            settings.geometry, screen.data(), extra, picture.counts);
+  GeometryOptions one_by_one = settings.geometry;  // what is vectorised is held to what is not
+  one_by_one.isa = Isa::kBaseline;
+  transform_triangles<Real>(triangles, 0, make_screen_transform(camera, Mode::kDepthFunction), one_by_one,
+                            screen.data(), extra, picture.counts);
   screen.insert(screen.end(), extra.begin(), extra.end());
 
   const auto width = static_cast<std::size_t>(settings.width);

@@ -1,0 +1,91 @@
+// tile_simd: tile_parallel with its loops in vectors.
+//
+// The same way through the frame as tile_parallel (binned, then one thread a tile), so that what differs is
+// the inner loops (fixed_lanes.h): boxes for binning are found a vector of triangles at a time without
+// setting them up; in a tile, triangles of a few pixels lie in the lanes of vectors and are set up and
+// sampled together, a sample position at a time (as in Abrash, Rasterization on Larrabee, 2009, turned by 90
+// degrees); larger ones have their spans found by exact division and drawn a vector of pixels at a time.
+#include "kernels/bins.h"
+#include "kernels/fixed_lanes.h"
+#include "kernels/kernel.h"
+
+namespace rasterbench {
+namespace {
+
+struct TileSimd {
+  static constexpr KernelInfo kInfo{.name = "tile_simd",
+                                    .parallel_unit = "a square tile (--tile, 64 pixels)",
+                                    .synchronisation = "none: an iteration owns its tile",
+                                    .work = "T + tiles of all boxes + B, in vectors",
+                                    .has_tiles = true,
+                                    .needs = "has its loops in the integers of fixed_8"};
+
+  template <std::same_as<Fixed8> Mode>
+  class Strategy {
+   public:
+    void draw(const StagedTriangles<Mode>& in, Visibility<Mode> out, Execution& execution) {
+      const FixedLanes& lanes = fixed_lanes(in.settings.geometry.isa);
+      const int side = in.settings.tile;
+      boxes_.require(static_cast<std::size_t>(in.size()), "the boxes of the triangles");
+      lists_.build(
+          in.size(), side, side, in.settings.width, in.settings.height, execution,
+          [&](std::int64_t begin, std::int64_t end) {
+            lanes.boxes(in.triangles.data() + begin, end - begin, boxes_.data() + begin);
+          },
+          [&](std::int64_t i) { return boxes_[static_cast<std::size_t>(i)]; });
+      small_.resize(static_cast<std::size_t>(execution.threads()));
+      const LaneTriangles triangles{in.triangles.data(), boxes_.data(), in.settings.fill, in.settings.tie,
+                                    in.triangle_count};
+      execution.loop(lists_.cells(), [&](std::int64_t tile, int worker) {
+        const PixelBox bounds = lists_.box(tile);
+        const LaneTarget target{out.keys.data(), out.width};
+        Batch& tiny = small_[static_cast<std::size_t>(worker)].tiny;
+        Batch& little = small_[static_cast<std::size_t>(worker)].little;
+        for (const std::uint32_t index : lists_.entries(tile)) {
+          const PixelBox& box = boxes_[index];
+          if (!FixedLanes::is_small(box)) {
+            const auto prepared = in.prepare(index);
+            if (!prepared.box.empty()) lanes.large(prepared, intersect(prepared.box, bounds), target);
+            continue;
+          }
+          // Lanes wait for the largest box among them: boxes of a kind go together.
+          const bool is_tiny = box.x1 - box.x0 <= kTinySide && box.y1 - box.y0 <= kTinySide;
+          Batch& batch = is_tiny ? tiny : little;
+          batch.indices[batch.size++] = index;
+          if (batch.size == kBatch) batch.draw(lanes, triangles, bounds, target);
+        }
+        tiny.draw(lanes, triangles, bounds, target);
+        little.draw(lanes, triangles, bounds, target);
+      });
+    }
+
+    std::size_t bytes() const { return boxes_.bytes() + lists_.bytes() + small_.size() * sizeof(small_[0]); }
+
+   private:
+    static constexpr std::int32_t kTinySide = 3;  // pixels
+    static constexpr std::size_t kBatch = 64;     // triangles: a few vectors of any width
+
+    struct Batch {
+      std::uint32_t indices[kBatch];
+      std::size_t size = 0;
+
+      void draw(const FixedLanes& lanes, const LaneTriangles& in, const PixelBox& bounds,
+                const LaneTarget& out) {
+        if (size > 0) lanes.small(in, indices, static_cast<std::int64_t>(size), bounds, out);
+        size = 0;
+      }
+    };
+    struct alignas(64) Batches {
+      Batch tiny, little;
+    };
+
+    Buffer<PixelBox> boxes_;
+    CellLists lists_;
+    std::vector<Batches> small_;  // per worker
+  };
+};
+
+const KernelRegistration<TileSimd> kRegistration;
+
+}  // namespace
+}  // namespace rasterbench
