@@ -19,7 +19,7 @@ constexpr double kStep =
 class PixelComparer {
  public:
   PixelComparer(std::span<const Triangle> triangles, const Camera& camera, NearRule near_rule,
-                const ModeBound& bound)
+                const PictureBound& bound)
       : triangles_(triangles), camera_(camera), near_rule_(near_rule), bound_(bound), cache_(1 << 12) {}
 
   // Of equal ids. The truth is asked too, so that an error of either computation shows.
@@ -60,7 +60,7 @@ class PixelComparer {
   std::span<const Triangle> triangles_;
   const Camera& camera_;
   NearRule near_rule_;
-  ModeBound bound_;
+  PictureBound bound_;
   std::vector<Footprint> cache_;
 };
 
@@ -68,7 +68,7 @@ class PixelComparer {
 
 Comparison compare_with_double(const IdImage& truth, std::span<const std::int32_t> ids,
                                std::span<const float> depths, std::span<const Triangle> triangles,
-                               const Camera& camera, NearRule near_rule, const ModeBound& bound) {
+                               const Camera& camera, NearRule near_rule, const PictureBound& bound) {
   const std::size_t width = static_cast<std::size_t>(truth.width);
   const std::size_t pixels = width * static_cast<std::size_t>(truth.height);
   if (ids.size() != pixels || depths.size() != pixels || truth.ids.size() != pixels ||

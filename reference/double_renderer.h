@@ -30,6 +30,16 @@ struct IdImage {
 IdImage render_in_double(std::span<const Triangle> triangles, const Camera& camera, FillRule fill,
                          NearRule near_rule);
 
+/// How far a picture may stray: by the bound of its mode and, where another program has drawn it, by that
+/// program's own geometry.
+struct PictureBound : ModeBound {
+  PictureBound(const ModeBound& mode = {}) : ModeBound(mode) {}  // NOLINT: a mode's bound is a picture's
+  double geometry_unit = 0x1p-53;  ///< unit roundoff of view, clipping and projection
+  /// The depth at a sample is d0 + gx x + gy y from the image's origin, unclamped, in [-1, 1]; not from a
+  /// corner, clamped to the corners' depths.
+  bool depth_from_origin = false;
+};
+
 /// What explains a pixel of a comparison.
 enum class PixelVerdict : std::uint8_t { kIdentical, kEdgeTie, kDepthTie, kError };
 
@@ -47,11 +57,11 @@ struct Comparison {
   bool within_bound() const { return errors == 0; }
 };
 
-/// Compares ids and depths that a kernel drew against `truth`, and classifies every difference by the bound
-/// of its mode. The fill rule is not asked for: a centre on an edge is within every mode's bound of it. A
-/// pixel without a triangle must have depth 1. Throws Error if the sizes do not match.
+/// Compares ids and depths that a kernel or another program drew against `truth`, and classifies every
+/// difference by `bound`. The fill rule is not asked for: a centre on an edge is within every mode's bound of
+/// it. A pixel without a triangle must have depth 1. Throws Error if the sizes do not match.
 Comparison compare_with_double(const IdImage& truth, std::span<const std::int32_t> ids,
                                std::span<const float> depths, std::span<const Triangle> triangles,
-                               const Camera& camera, NearRule near_rule, const ModeBound& bound);
+                               const Camera& camera, NearRule near_rule, const PictureBound& bound);
 
 }  // namespace rasterbench

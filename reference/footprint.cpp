@@ -8,7 +8,8 @@
 // The model of a kernel: clip coordinates in double; clip at the near plane and at the guard band; project;
 // round the vertices (vertex_unit), snap; fan into pieces; bounding box and edge functions (b-a)x(p-a)
 // (edge_unit); depth d0 + gy dy + gx dx (depth_unit), clamped to the depths of the piece; round to float.
-// Nothing is assumed about the order of vertices or the choice of the fan.
+// Nothing is assumed about the order of vertices or the choice of the fan. What another program's pipeline
+// does otherwise is said by PictureBound.
 #include "reference/footprint.h"
 
 #include <algorithm>
@@ -27,7 +28,7 @@ constexpr double gamma(int n, double unit) { return n * unit / (1 - n * unit); }
 
 // Geometry of the kernel and of this file: an affine row 4, the viewport 4, a cut 4 at each of up to 5
 // planes, the division and the offset 3, hence 31 roundings each.
-constexpr double kGeometry = gamma(64, kDoubleUnit);
+double geometry_error(const PictureBound& bound) { return gamma(64, bound.geometry_unit); }
 // An edge function: two differences and a product in each term, and their difference. Twice that, because the
 // bound is taken at the exact vertices instead of the rounded ones.
 constexpr int kEdgeRoundings = 8;
@@ -37,7 +38,7 @@ constexpr int kGradientRoundings = 6;
 // The plane at a point: a difference, a product and two sums.
 constexpr int kPlaneRoundings = 5;
 
-// A computed value and the size of what it was summed from: its error is at most kGeometry * size.
+// A computed value and the size of what it was summed from: its error is at most geometry_error() * size.
 struct Sum {
   double value, size;
 };
@@ -133,7 +134,7 @@ EdgeView view_of(const Polygon& polygon, std::size_t i, double x, double y, Edge
   return view;
 }
 
-void finish(Polygon& polygon, const ModeBound& bound) {
+void finish(Polygon& polygon, const PictureBound& bound) {
   const auto& v = polygon.vertices;
   double area = 0;
   for (std::size_t i = 0; i < v.size(); ++i) {
@@ -164,7 +165,7 @@ void finish(Polygon& polygon, const ModeBound& bound) {
 // of the polygon. Along a firm edge the hull ends at the moved edge itself. Where an edge is not firm, the
 // kernel may see the triangle reversed, and a point is accepted that the errors of all edges together (hence
 // perimeter / length) hide from this one.
-bool may_be_inside(const Polygon& polygon, double x, double y, const ModeBound& bound) {
+bool may_be_inside(const Polygon& polygon, double x, double y, const PictureBound& bound) {
   if (polygon.vertices.size() < 3) return false;
   if (!polygon.is_bounded) return true;
   const double r = polygon.reach;
@@ -184,7 +185,7 @@ bool may_be_inside(const Polygon& polygon, double x, double y, const ModeBound& 
 // Whether the kernel has to find (x, y) covered. While the vertices move to where the kernel has them, no
 // edge passes over the point, either because its line does not or because its points move by less than their
 // distance to it; so the outline still winds round the point, and the pieces share their inner edges exactly.
-bool must_be_inside(const Polygon& polygon, double x, double y, const ModeBound& bound) {
+bool must_be_inside(const Polygon& polygon, double x, double y, const PictureBound& bound) {
   if (polygon.vertices.size() < 3 || !polygon.is_bounded || polygon.orientation == 0) return false;
   const double edge_error = gamma(kEdgeRoundings, bound.edge_unit);
   for (std::size_t i = 0; i < polygon.vertices.size(); ++i) {
@@ -201,7 +202,7 @@ bool must_be_inside(const Polygon& polygon, double x, double y, const ModeBound&
 // hence the sizes of their products), amplified by the distance to the vertex that the plane starts from,
 // which may be any. `least` is the smallest area that the kernel may have found; where the errors reach the
 // area itself, only the clamp bounds the depth.
-DepthRange depth_on_piece(const Polygon& piece, double x, double y, const ModeBound& bound) {
+DepthRange depth_on_piece(const Polygon& piece, double x, double y, const PictureBound& bound) {
   const auto& v = piece.vertices;
   // The kernel's roundings, and this function's.
   const double gradient_error = gamma(kGradientRoundings, bound.depth_unit + kDoubleUnit);
@@ -220,7 +221,8 @@ DepthRange depth_on_piece(const Polygon& piece, double x, double y, const ModeBo
     const double area = x1 * y2 - x2 * y1, gx = (d1 * y2 - d2 * y1) / area, gy = (d2 * x1 - d1 * x2) / area;
     const double products = (ax1 + dr) * (ay2 + dr) + (ax2 + dr) * (ay1 + dr);
     const double least = std::abs(area) - dr * (ax1 + ay1 + ax2 + ay2 + 2 * dr) - gradient_error * products;
-    if (!(least > 0.5 * std::abs(area))) return {d_min - room, d_max + room};
+    if (!(least > 0.5 * std::abs(area)))
+      return bound.depth_from_origin ? DepthRange{-1, 1} : DepthRange{d_min - room, d_max + room};
     // A numerator: the size of its products, the largest quotient, and the error of the quotient.
     const double x_products = (ad1 + ds) * (ay2 + dr) + (ad2 + ds) * (ay1 + dr);
     const double y_products = (ad1 + ds) * (ax2 + dr) + (ad2 + ds) * (ax1 + dr);
@@ -231,12 +233,17 @@ DepthRange depth_on_piece(const Polygon& piece, double x, double y, const ModeBo
     const double gy_error =
         gradient_error * (y_products + gy_most * products) / least + bound.reciprocal_error * gy_most;
     const double dx = std::abs(x - a.x) + piece.reach, dy = std::abs(y - a.y) + piece.reach;
-    rounding = std::max(rounding, gx_error * dx + gy_error * dy +
-                                      plane_error * (std::abs(a.d) + slack + gx_most * dx + gy_most * dy));
+    // From the origin there and back: d0 = d - (gx x + gy y) at a corner, in window depths (d + 1) / 2.
+    const double size = bound.depth_from_origin
+                            ? 1 + gx_most * (dx + 2 * std::abs(a.x)) + gy_most * (dy + 2 * std::abs(a.y))
+                            : gx_most * dx + gy_most * dy;
+    rounding =
+        std::max(rounding, gx_error * dx + gy_error * dy + plane_error * (std::abs(a.d) + slack + size));
     movement = std::hypot(gx, gy) * (piece.reach + gamma(kEdgeRoundings, bound.edge_unit) * piece.perimeter);
     depth = a.d + gy * (y - a.y) + gx * (x - a.x);
   }
   const double tolerance = rounding + movement + slack + output;
+  if (bound.depth_from_origin) return {std::max(depth - tolerance, -1.0), std::min(depth + tolerance, 1.0)};
   return {std::clamp(depth - tolerance, d_min - room, d_max - room),
           std::clamp(depth + tolerance, d_min + room, d_max + room)};
 }
@@ -260,12 +267,13 @@ bool may_lack_world_area(const Triangle& t) {
 // The visible part of a triangle, with the near plane moved by near_side (+-1) times the error of the
 // distance to it.
 Polygon visible_part(const std::array<Corner, 3>& corners, double near_side, NearRule near_rule,
-                     const ModeBound& bound) {
+                     const PictureBound& bound) {
   const Corner &a = corners[0], &b = corners[1], &c = corners[2];
   std::vector<Weights> weights = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  const double geometry = geometry_error(bound);
   const auto clip = [&](auto value) { weights = clipped(weights, {value(a), value(b), value(c)}); };
   if (near_rule == NearRule::kClip)
-    clip([&](const Corner& p) { return p.near.value + near_side * kGeometry * p.near.size; });
+    clip([&](const Corner& p) { return p.near.value + near_side * geometry * p.near.size; });
   clip([](const Corner& p) { return kGuardBand * p.w.value + p.x.value; });
   clip([](const Corner& p) { return kGuardBand * p.w.value - p.x.value; });
   clip([](const Corner& p) { return kGuardBand * p.w.value + p.y.value; });
@@ -276,15 +284,15 @@ Polygon visible_part(const std::array<Corner, 3>& corners, double near_side, Nea
     const Sum z = weighted(k, a.z, b.z, c.z), w = weighted(k, a.w, b.w, c.w);
     Vertex v{.x = x.value / w.value, .y = y.value / w.value, .d = z.value / w.value, .reach = 0, .slack = 0};
     const auto error = [&](double quotient, const Sum& numerator) {
-      return kGeometry * ((numerator.size + std::abs(quotient) * w.size) / w.value + std::abs(quotient));
+      return geometry * ((numerator.size + std::abs(quotient) * w.size) / w.value + std::abs(quotient));
     };
     v.reach = std::hypot(error(v.x, x) + bound.vertex_unit * std::abs(v.x) + bound.snap,
                          error(v.y, y) + bound.vertex_unit * std::abs(v.y) + bound.snap);
     // The kernel may cut at the guard band after the division, in pixels.
-    if (std::max({k[0], k[1], k[2]}) < 1) v.reach += kGeometry * kGuardBand;
+    if (std::max({k[0], k[1], k[2]}) < 1) v.reach += geometry * kGuardBand;
     v.slack = error(v.d, z) + bound.vertex_unit * std::max(1.0, std::abs(v.d)) + bound.corner_depth_error;
     // A w that may be zero: the vertex may be anywhere.
-    if (!(w.value > 2 * kGeometry * w.size)) v.reach = INFINITY;
+    if (!(w.value > 2 * geometry * w.size)) v.reach = INFINITY;
     polygon.vertices.push_back(v);
   }
   finish(polygon, bound);
@@ -294,7 +302,7 @@ Polygon visible_part(const std::array<Corner, 3>& corners, double near_side, Nea
 }  // namespace
 
 Footprint::Footprint(const Triangle& t, std::int32_t id, const Camera& camera, NearRule near_rule,
-                     const ModeBound& bound)
+                     const PictureBound& bound)
     : id_(id), bound_(bound) {
   if (!is_finite(t.a) || !is_finite(t.b) || !is_finite(t.c)) return;
   if (is_same(t.a, t.b) || is_same(t.b, t.c) || is_same(t.c, t.a)) return;
@@ -302,9 +310,10 @@ Footprint::Footprint(const Triangle& t, std::int32_t id, const Camera& camera, N
                                          corner_in_pixels(camera, t.c)};
   may_vanish_ = may_lack_world_area(t);
   if (near_rule == NearRule::kOff) {
+    const double geometry = geometry_error(bound);
     for (const Corner& p : corners) {
-      if (p.w.value < -kGeometry * p.w.size) return;
-      if (p.w.value <= kGeometry * p.w.size) may_vanish_ = true;
+      if (p.w.value < -geometry * p.w.size) return;
+      if (p.w.value <= geometry * p.w.size) may_vanish_ = true;
     }
   }
   smallest_ = visible_part(corners, -1, near_rule, bound);

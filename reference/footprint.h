@@ -40,7 +40,7 @@ class Footprint {
  public:
   Footprint() = default;
   Footprint(const Triangle& triangle, std::int32_t id, const Camera& camera, NearRule near_rule,
-            const ModeBound& bound);
+            const PictureBound& bound);
 
   /// The triangle's, or -1 for an empty footprint.
   std::int32_t id() const { return id_; }
@@ -53,7 +53,7 @@ class Footprint {
 
  private:
   std::int32_t id_ = -1;
-  ModeBound bound_{};
+  PictureBound bound_{};
   bool may_vanish_ = false;  // its world area or, without a near plane, its w is zero but for rounding
   Polygon smallest_;         // with the near plane as far away as errors can bring it
   // With the near plane as near as errors can bring it, all triangles of the polygon's vertices: any fan that
