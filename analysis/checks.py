@@ -161,18 +161,19 @@ def _families(analysis: Analysis) -> Iterator[Warn]:
 def _agreement(analysis: Analysis) -> Iterator[Warn]:
     study = analysis.study
     counts = study.context["points"]
-    run = len([r for r in study.records if r.raw.get("status") == "ok"])
+    records = study.every_record
+    run = len([r for r in records if r.raw.get("status") == "ok"])
     planned = counts.get("planned")
-    if isinstance(planned, int) and planned != len(study.records):
-        yield Warn(NOT_PUBLISHABLE, f"the context plans {planned} points, the records hold {len(study.records)}.")
-    elif isinstance(counts.get("run"), int) and counts["run"] not in (run, len(study.records)):
+    if isinstance(planned, int) and planned != len(records):
+        yield Warn(NOT_PUBLISHABLE, f"the context plans {planned} points, the records hold {len(records)}.")
+    elif isinstance(counts.get("run"), int) and counts["run"] not in (run, len(records)):
         yield Warn(NOTE, f"the context counts {counts['run']} points as run, the records {run}.")
     own = study.context.get("id")
-    strangers = [r for r in study.records if own and r.context not in (None, own)]
+    strangers = [r for r in records if own and r.context not in (None, own)]
     if strangers:
         yield Warn(NOT_PUBLISHABLE, f"{text.count(len(strangers), 'record')} of another context than context.json: their machine or build"
                    " may differ.")
-    contradicted = [r for r in study.records if r.raw.get("status") == "ok" and not r.ok]
+    contradicted = [r for r in records if r.raw.get("status") == "ok" and not r.ok]
     if contradicted:
         yield Warn(NOT_PUBLISHABLE, f"{text.count(len(contradicted), 'record')} with status ok but without a verdict that it conforms:"
                    " shown as failed.")

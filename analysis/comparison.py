@@ -14,6 +14,7 @@ from .statistics import Comparison, Estimate
 GROUP_AXES = ("scene", "scene_hash", "size", "numeric", "fill", "near", "output", "cache")
 # Always in a point's name: kernel, backend:schedule,chunk, threads. These only where a kernel has several values.
 EXTRA_AXES = ("isa", "tile", "binding", "wait_policy", "runtime", "generality")
+PEER_AXES = ("scene", "scene_hash", "size")  # what a peer shares with the groups that it is shown beside
 BASE_AXES = ("scene", "scene_hash", "size", "numeric", "fill", "near", "isa", "output", "cache")
 
 
@@ -24,6 +25,7 @@ class Group:
     key: tuple
     title: str
     records: list[Record]
+    peers: list[Record] = field(default_factory=list)  # other programs on the same scene and size
     best: Record | None = None
     comparisons: dict[str, Comparison] = field(default_factory=dict)
     slug: str = ""  # for file names; no two groups have the same
@@ -42,7 +44,7 @@ class Group:
 
     @property
     def family_slug(self) -> str:
-        config = self.records[0].config
+        config = (self.records or self.peers)[0].config
         return slug(f"{config.scene} {config.size[0]}x{config.size[1]}")
 
 
@@ -68,6 +70,10 @@ def slug(title: str) -> str:
     return f"{name[:30].rpartition('_')[0]}_{digest}_{name[-26:].partition('_')[2]}"
 
 
+def _peer_key(record: Record) -> tuple:
+    return tuple(getattr(record.config, axis) for axis in PEER_AXES)
+
+
 def execution(config: Config) -> str:
     """'serial', 'openmp static', 'openmp dynamic,1', 'tbb auto'."""
     if config.backend == "serial" or config.schedule is None:
@@ -76,13 +82,18 @@ def execution(config: Config) -> str:
     return f"{config.backend} {config.schedule}{chunk}"
 
 
+def strategy(record: Record) -> str:
+    """The kernel, or the peer, which is called one."""
+    return f"{record.config.kernel} (peer)" if record.config.is_peer else record.config.kernel
+
+
 class Analysis:
     """A study with everything that is computed from it once and shown in several places."""
 
     def __init__(self, study: Study) -> None:
         self.study = study
         self._extra = self._varying_extras()
-        self.estimates = {record.id: statistics.median_estimate(record.samples) for record in study.timed}
+        self.estimates = {record.id: statistics.median_estimate(record.samples) for record in study.every_record if record.ok}
         self.groups = self._groups()
         self.serial_base = {record.id: self._find_serial_base(record) for record in study.timed}
         self.thread_base = {record.id: self._find_thread_base(record) for record in study.timed}
@@ -113,7 +124,9 @@ class Analysis:
         return text.count(record.config.threads, "thread")
 
     def label(self, record: Record) -> str:
-        """'tile_parallel with openmp dynamic,1 on 2 threads'."""
+        """'tile_parallel with openmp dynamic,1 on 2 threads', 'llvmpipe (peer) on 2 threads'."""
+        if record.config.is_peer:
+            return f"{strategy(record)} on {self.threads(record)}"
         where = "" if record.config.backend == "serial" else f" on {self.threads(record)}"
         return f"{record.config.kernel} with {self.execution(record)}{where}"
 
@@ -138,6 +151,14 @@ class Analysis:
         found: dict[tuple, list[Record]] = {}
         for record in self.study.records:
             found.setdefault(tuple(getattr(record.config, axis) for axis in GROUP_AXES), []).append(record)
+        peers: dict[tuple, list[Record]] = {}
+        for record in self.study.peers:
+            peers.setdefault(_peer_key(record), []).append(record)
+        beside = {key: peers.get(_peer_key(records[0]), []) for key, records in found.items()}
+        drawn = {_peer_key(records[0]) for records in found.values()}
+        for key in (key for key in peers if key not in drawn):  # no kernel drew that picture
+            alone = tuple(getattr(peers[key][0].config, axis) for axis in GROUP_AXES)
+            found[alone], beside[alone] = [], peers[key]
         varying = [axis for i, axis in enumerate(GROUP_AXES) if len({key[i] for key in found}) > 1]
         # A hash is said only where the same name stands for two contents.
         names = {key[0] for key in found}
@@ -146,11 +167,11 @@ class Analysis:
         families = sum(any(record.ok for record in records) for records in found.values())
         groups = []
         for key, records in found.items():
-            config = records[0].config
+            config = (records or beside[key])[0].config
             title = f"{config.scene} {config.size[0]}x{config.size[1]} {config.numeric}"
             said = {"scene", "size", "numeric"}
             title += "".join(f" {getattr(config, axis)}" for axis in varying if axis not in said)
-            groups.append(self._compared(Group(key, title, records), families))
+            groups.append(self._compared(Group(key, title, records, beside[key]), families))
         for group in groups:
             same = [other for other in groups if slug(other.title) == slug(group.title)]
             group.slug = slug(group.title) + (f"_{same.index(group) + 1}" if len(same) > 1 else "")
@@ -165,7 +186,7 @@ class Analysis:
         return group
 
     def group_of(self, record: Record) -> Group:
-        return next(group for group in self.groups if any(r is record for r in group.records))
+        return next(group for group in self.groups if any(r is record for r in (*group.records, *group.peers)))
 
     def _median(self, record: Record) -> float:
         return self.estimates[record.id].value

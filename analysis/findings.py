@@ -244,7 +244,7 @@ def balance(analysis: Analysis) -> Iterator[Finding]:
 
 
 def untimed(analysis: Analysis) -> Iterator[Finding]:
-    records = analysis.study.records
+    records = analysis.study.every_record
     for status, weight in (("failed", 2.0), ("skipped", 1.0)):
         chosen = [r for r in records if r.status == status]
         if not chosen:
@@ -279,7 +279,8 @@ def plain_facts(analysis: Analysis) -> Iterator[Finding]:
     """What can always be said, so that a small study has three lines too."""
     study = analysis.study
     if not study.timed:
-        yield Finding("nothing", 4, f"No point of {study.name} was timed, so nothing can be said about speed.")
+        what = "No point of a kernel in" if study.peers else "No point of"
+        yield Finding("nothing", 4, f"{what} {study.name} was timed, so nothing can be said about speed.")
         yield Finding("compared", 0.1, "No comparison was made: it takes two timed points of one scene.")
         kernels = list(dict.fromkeys(r.config.kernel for r in study.records))
         yield Finding("planned", 0.2, f"{text.count(len(study.records), 'point')} of {text.count(len(kernels), 'kernel')} were planned.")
@@ -287,7 +288,8 @@ def plain_facts(analysis: Analysis) -> Iterator[Finding]:
     if len(study.timed) == 1 or all(len(g.timed) < 2 for g in analysis.groups):
         record = study.timed[0]
         yield Finding("single", 3, f"On {where(analysis.group_of(record))} {analysis.label(record)} takes {analysis.time(record)}"
-                      f" (n = {record.samples.n}); no other point of this scene was timed, so it is compared with nothing.")
+                      f" (n = {record.samples.n}); no other point of {'a kernel on ' if study.peers else ''}this scene was timed, so it is"
+                      " compared with nothing.")
     widths = [((e.high - e.low) / e.value / 2, r) for r in study.timed if (e := analysis.estimates[r.id]).has_interval]
     if widths:
         width, record = max(widths, key=lambda pair: pair[0])

@@ -18,6 +18,7 @@ STAGES = ("clear", "geometry", "raster", "resolve")
 COUNTED = {"wrong", "exact_ties", "edge", "depth", "unexplained", "unbounded", "predicted", "wrong_on_snapped", "worst_distance_px",
            "max_depth_error_steps", "ambiguous", "edge_ties", "depth_ties", "errors", "false_positives", "false_negatives"}
 STATUSES = ("ok", "failed", "skipped")
+PEERS = ("llvmpipe",)  # other programs that draw the same pictures; as a record's backend
 
 
 class InputError(Exception):
@@ -52,6 +53,10 @@ class Config:
     tile: int | str | None = None
     generality: str | None = None
 
+    @property
+    def is_peer(self) -> bool:
+        return self.backend in PEERS
+
 
 @dataclass(frozen=True)
 class Record:
@@ -80,9 +85,16 @@ class Record:
 
 @dataclass(frozen=True)
 class Study:
+    """A study; its records are of kernels, with those of peers beside them: a peer is shown, never compared as a kernel is."""
+
     directory: Path
     context: dict[str, Any]
     records: list[Record]
+    peers: list[Record] = field(default_factory=list)
+
+    @property
+    def every_record(self) -> list[Record]:
+        return [*self.records, *self.peers]
 
     @property
     def name(self) -> str:
@@ -101,7 +113,7 @@ class Study:
     def frame(self) -> pd.DataFrame:
         """One row a record: the axes, then what was measured."""
         rows = []
-        for record in self.records:
+        for record in self.every_record:
             row: dict[str, Any] = {axis.name: getattr(record.config, axis.name) for axis in fields(Config)}
             row["size"] = "x".join(map(str, record.config.size))
             row |= {"id": record.id, "name": record.name, "status": record.status, "reason": record.reason,
@@ -122,7 +134,8 @@ def load(directory: Path) -> Study:
     if not directory.is_dir():
         raise InputError(directory, "no such folder (expected the folder that a study wrote)")
     context = _context(directory / "context.json")
-    return Study(directory, context, _records(directory / "records.jsonl"))
+    records = _records(directory / "records.jsonl")
+    return Study(directory, context, [r for r in records if not r.config.is_peer], [r for r in records if r.config.is_peer])
 
 
 def read_text(path: Path, missing: str = "no such file (was the study interrupted? run it again with --resume)") -> str:
@@ -219,7 +232,11 @@ class _Reader:
         verify = self.verdicts(required=status == "ok")
         samples = self.samples() if status == "ok" else None
         stages = self.stages(samples.n) if samples else {}
-        if status == "ok" and verify.get("conforms") is not True:
+        if status == "ok" and config.is_peer:
+            # A peer has no specification to conform to: it must be within its bound of the truth.
+            if (verify.get("end_to_end") or {}).get("errors") != 0:
+                status, samples, stages, reason = "failed", None, {}, "not known to be within its bound"
+        elif status == "ok" and verify.get("conforms") is not True:
             # Invariant 1: what is not known to conform shows no speed, whatever the status says.
             status, samples, stages = "failed", None, {}
             reason = "does not conform" if verify.get("conforms") is False else "conformity was not checked"

@@ -77,7 +77,7 @@ def render(analysis: Analysis, sections: dict[str, list[Embedded]], found: list[
         placed_tables=placed(found, hidden), hidden=len(hidden), section_words={trade.SECTION: trade_text.summary(analysis)},
         section_tables=by_section(found), sections=list(sections.items()), context=recorded(study.context), cell_class=cell_class,
         trade_section=f"\u201c{trade.SECTION}\u201d",
-        version=__version__, records=f"{text.count(len(study.records), 'record')} in {study.directory.name}/records.jsonl",
+        version=__version__, records=f"{text.count(len(study.every_record), 'record')} in {study.directory.name}/records.jsonl",
         min_launches=statistics.MIN_LAUNCHES)
 
 
@@ -117,10 +117,10 @@ def cell_class(cell: object) -> Markup:
 
 
 def counts(analysis: Analysis) -> list[tuple[str, int]]:
-    records = analysis.study.records
+    records = analysis.study.every_record
     planned = analysis.study.context["points"].get("planned")
     return [("points planned", planned if isinstance(planned, int) else len(records)),
-            ("timed", len(analysis.study.timed)),
+            ("timed", sum(r.ok for r in records)),
             ("skipped", sum(r.status == "skipped" for r in records)),
             ("failed", sum(r.status == "failed" for r in records))]
 

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from . import latex, statistics, text
-from .comparison import GROUP_AXES, Analysis, Group
+from .comparison import GROUP_AXES, Analysis, Group, strategy
 from .load import Record
 from .statistics import Comparison, Estimate
 
@@ -99,12 +99,35 @@ def points(analysis: Analysis, group: Group) -> Table:
             said |= {"median ms [95 %]": f"{record.status}: {text.shorten(record.reason, 60)}"}
         numbers.append(row)
         words.append(said)
+    for record in group.peers:
+        row, said = _peer(analysis, group, record)
+        numbers.append(row)
+        words.append(said)
     bases = sorted({f"{b.config.kernel} ({text.number(analysis.estimates[b.id].value / 1000)} s, {b.config.isa})"
                     for r in group.timed if (b := analysis.serial_base[r.id]) is not None})
     note = ("Intervals in brackets are 95 %. Base (a): " + (text.listing(bases) if bases else "none, no serial kernel was timed")
-            + "; base (b): the same point on one thread, with its seconds.")
+            + "; base (b): the same point on one thread, with its seconds."
+            + (" A peer is another program, with an arithmetic and a fill rule of its own: it has no speedup and is no base."
+               if group.peers else ""))
     return Table(f"points_{group.slug}", f"Strategy and execution, {group.title}", note,
                  pd.DataFrame(numbers).convert_dtypes(), pd.DataFrame(words).fillna(""), frozenset(marked))
+
+
+def _peer(analysis: Analysis, group: Group, record: Record) -> tuple[dict[str, Any], dict[str, str]]:
+    """A peer's row: its time, also over the fastest kernel's."""
+    config = record.config
+    row: dict[str, Any] = {"scene": config.scene, "size": "x".join(map(str, config.size)), "numeric": config.numeric,
+                           "kernel": strategy(record), "backend": config.backend, "threads": config.threads, "isa": config.isa,
+                           "status": record.status, "reason": record.reason, "id": record.id}
+    said = {"kernel": strategy(record), "execution": analysis.execution(record), "threads": str(config.threads)}
+    if not record.ok:
+        return row, said | {"median ms [95 %]": f"{record.status}: {text.shorten(record.reason, 60)}"}
+    ratio = statistics.ratio(record.samples, group.best.samples) if group.best is not None else None
+    row |= columns("median_ms", analysis.estimates[record.id]) | columns("time_over_fastest", ratio)
+    row |= {"n": record.samples.n, "launches": record.samples.launch_count, "interval": analysis.estimates[record.id].kind,
+            "stop": record.stop}
+    return row, said | {"median ms [95 %]": times(analysis.estimates[record.id]), "n": str(record.samples.n),
+                        "stop": record.stop or text.MISSING, "verdict": "within its bound", "time / fastest": times(ratio)}
 
 
 def _ordered(group: Group) -> list[Record]:
@@ -264,7 +287,7 @@ def _kernels(analysis: Analysis, records: list[Record]) -> str:
 
 def not_timed(analysis: Analysis) -> Table:
     reasons: dict[tuple[str, str], list[Record]] = {}
-    for record in analysis.study.records:
+    for record in analysis.study.every_record:
         if not record.ok:
             reasons.setdefault((record.status, record.reason), []).append(record)
     frame = pd.DataFrame([{"status": status, "reason": reason, "points": len(records),

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from .. import style, text
 from ..captions import Caption
-from ..comparison import Analysis, Group
+from ..comparison import Analysis, Group, strategy
 from ..load import Record
 
 ROW_HEIGHT = 0.175  # inches
@@ -183,6 +183,24 @@ def execution_rows(analysis: Analysis, group: Group, kernel: str) -> dict[str, l
         if record.config.kernel == kernel:
             rows.setdefault(analysis.execution(record), []).append(record)
     return rows
+
+
+def peer_blocks(analysis: Analysis, group: Group, threads: list[int]) -> list[Block]:
+    """The peers of a group, below its kernels."""
+    found: dict[str, list[Record]] = {}
+    for record in group.peers:
+        found.setdefault(strategy(record), []).append(record)
+    blocks = []
+    for name, records in found.items():
+        points = []
+        for record in records:
+            if record.ok:
+                e = analysis.estimates[record.id]
+                points.append(Point(e.value, e.low, e.high, threads.index(record.config.threads)))
+        rows = [Row(analysis.execution(records[0]), tuple(points))] if points else []
+        rows += [Row(analysis.threads(r), message=f"{r.status}: {r.reason}") for r in records if not r.ok]
+        blocks.append(Block(name, rows))
+    return blocks
 
 
 def untimed_rows(analysis: Analysis, group: Group, kernel: str, most: int = 3) -> list[Row]:

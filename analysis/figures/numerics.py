@@ -8,7 +8,7 @@ from .. import captions
 from ..comparison import Analysis, Group
 from ..load import Record
 from ..tables import accuracy
-from .common import Block, Drawing, Row, bounds, dots, drawn_together, families, named, pages, part, spread
+from .common import Block, Drawing, Row, bounds, dots, drawn_together, families, named, pages, part, peer_blocks, spread
 from .times import point, thread_series
 
 SECTION = "Numeric modes"
@@ -36,10 +36,12 @@ def _draw(analysis: Analysis, groups: list[Group]) -> Iterator[Drawing]:
     records = [r for modes in shown.values() for rs in modes.values() for r in rs]
     if not records:
         return
-    threads = thread_series(records)
+    peers = [r for r in groups[0].peers if r.ok]
+    threads = thread_series([*records, *peers])
     blocks = [Block(f"{kernel}, {execution}", [
         Row(mode, tuple(point(analysis.estimates[r.id], threads.index(r.config.threads)) for r in rs), note=accuracy(rs[0]))
         for mode, rs in modes.items()]) for (kernel, execution), modes in shown.items()]
+    blocks += peer_blocks(analysis, groups[0], threads)
     every = [p for block in blocks for row in block.rows for p in row.points]
     log = spread([p.value for p in every])
     split = pages(blocks)

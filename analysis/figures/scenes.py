@@ -66,7 +66,7 @@ def _images(analysis: Analysis) -> dict[str, np.ndarray]:
 
 def _record(analysis: Analysis, scene: str) -> Record | None:
     """A record that says how much work the scene is: the largest of its sizes."""
-    records = [r for r in analysis.study.records if r.config.scene == scene and r.work]
+    records = [r for r in analysis.study.every_record if r.config.scene == scene and r.work]
     return max(records, key=lambda r: r.config.size[0] * r.config.size[1], default=None)
 
 

@@ -5,17 +5,17 @@ from __future__ import annotations
 from typing import Iterator
 
 from .. import captions, text
-from ..comparison import Analysis, Group
+from ..comparison import Analysis, Group, strategy
 from ..load import Record
 from ..statistics import Estimate
-from .common import Block, Drawing, Point, Row, bounds, dots, drawn_together, execution_rows, named, pages, part, spread, untimed_rows
+from .common import Block, Drawing, Point, Row, bounds, dots, drawn_together, execution_rows, named, pages, part, peer_blocks, spread, untimed_rows
 
 SECTION = "Time per strategy"
 
 
 def draw(analysis: Analysis) -> Iterator[Drawing]:
     for group in analysis.groups:
-        if group.timed and not drawn_together(analysis, group):
+        if (group.timed or any(r.ok for r in group.peers)) and not drawn_together(analysis, group):
             yield from _draw(analysis, group)
 
 
@@ -28,7 +28,8 @@ def point(estimate: Estimate, series: int, ringed: bool = False) -> Point:
 
 
 def _draw(analysis: Analysis, group: Group) -> Iterator[Drawing]:
-    threads = thread_series(group.timed)
+    peers = [r for r in group.peers if r.ok]
+    threads = thread_series([*group.timed, *peers])
     blocks = []
     for kernel in group.kernels:
         rows = []
@@ -38,11 +39,12 @@ def _draw(analysis: Analysis, group: Group) -> Iterator[Drawing]:
             rows.append(Row(execution, points, note="fastest" if group.best in records else ""))
         rows += untimed_rows(analysis, group, kernel)
         blocks.append(Block(kernel, rows))
+    blocks += peer_blocks(analysis, group, threads)
     every = [p for block in blocks for row in block.rows for p in row.points]
     log = spread([p.value for p in every])
     split = pages(blocks)
     for page, chosen in enumerate(split):
-        shown = [r for r in group.timed if any(block.kernel == r.config.kernel for block in chosen)]
+        shown = [r for r in (*group.timed, *peers) if any(block.kernel == strategy(r) for block in chosen)]
         # All pages of a scene share one axis, so that they can be laid side by side.
         figure = dots(chosen, [f"{n} thread{'s' if n > 1 else ''}" for n in threads], group.title + part(page, len(split)),
                       "time of a frame, median (ms)" + (", log scale" if log else ""), limits=bounds(every), log=log,
@@ -65,6 +67,9 @@ def _notes(analysis: Analysis, group: Group) -> list[str]:
         notes.append(f"Told apart means: rank test, corrected for {text.count(len(group.timed) - 1, 'comparison')} (Holm)"
                      + (f" on each of {scenes} scenes" if scenes > 1 else "")
                      + ", below 0.05, and the paired interval of the ratio above 1.")
+    if group.peers:
+        notes.append("A peer is another program that draws the same scene, with an arithmetic and a fill rule of its own: no kernel, and"
+                     " no base of a speedup.")
     if group.untimed:
         notes.append("Failed and skipped points are listed with their reasons and show no time.")
     return notes
