@@ -149,7 +149,9 @@ Json describe_context(const Study& study, const StudyOptions& options,
   context["region"] =
       "one frame: world triangles in memory -> RGBA8 + float32 depth in memory; stages clear, geometry, "
       "raster, resolve; "
-      "allocation, files and verification are outside";
+      "allocation, files and verification are outside; a peer's frame: triangles and their colours in a "
+      "vertex "
+      "buffer -> the same, in its framebuffer: clear, draw, finish";
   context["custom"] = custom.empty() ? Json::object() : Json(custom);
   return context;
 }

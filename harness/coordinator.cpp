@@ -55,6 +55,7 @@ class Coordinator {
 
     Json context = describe_context(study_, study_options_, options_.custom_context);
     verify_points();
+    describe_peers(context);
     draw_images(context);
     sample_points();
     return finish(context);
@@ -141,6 +142,8 @@ class Coordinator {
       ask_verifier(
           *state, {{"op", "verify"}, {"point", point_to_json(state->planned->point)}},
           [&](const Json& judgement) {
+            if (judgement.contains("skip"))
+              return record_event({{"event", "skip"}, {"reason", judgement.at("skip")}}, *state);
             const double frame_ms = judgement.at("frame_ms");
             const bool warm =
                 state->planned->point.cache == "warm";  // only a sample's first frame would be cold
@@ -151,6 +154,15 @@ class Coordinator {
           });
       if (!state->failure.empty()) progress_.note("FAILED " + state->planned->name + ": " + state->failure);
     }
+  }
+
+  /// The peers that were verified, each with what it says of itself.
+  void describe_peers(Json& context) const {
+    for (const PointState& state : states_)
+      if (is_peer(state.planned->point) && state.judgement.contains("verify"))
+        context["libraries"][state.planned->point.kernel] =
+            fmt::format("{}; {}", state.judgement.at("verify").at("peer").at("renderer").get<std::string>(),
+                        state.judgement.at("verify").at("peer").at("version").get<std::string>());
   }
 
   /// A picture of each scene for the report, by the first point of it that passed. A side matter: what goes
@@ -213,7 +225,7 @@ class Coordinator {
       const auto base = fastest.find(comparison_of(point));
       const bool is_base =
           (base != fastest.end() && base->second == &state && open_comparison[comparison_of(point)]) ||
-          (point.execution.threads == 1 && open_family[family_of(point)]) ||
+          (point.execution.threads == 1 && !is_peer(point) && open_family[family_of(point)]) ||
           (is_literal_program(point) && open_trade[trade_of(point)]);
       if (state.open() || is_base) block.push_back(&state);
     }

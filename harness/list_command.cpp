@@ -2,6 +2,8 @@
 
 #include "base/error.h"
 #include "harness/commands.h"
+#include "harness/process.h"
+#include "harness/runner.h"
 #include "harness/study.h"
 #include "kernels/kernel.h"
 #include "scene/generator.h"
@@ -60,6 +62,38 @@ Json list_backends() {
   if (is_left_out("tbb"))
     list.push_back(
         {{"name", "tbb"}, {"runtime", "oneTBB was not found when this was built"}, {"available", false}});
+  return list;
+}
+
+/// A peer is asked in a process of its own: its libraries stay out of this one.
+Json list_peers() {
+  Json list = Json::array();
+  for (const std::string& name : kPeers) {
+    Json entry{{"name", name},
+               {"what", "Mesa's OpenGL on the CPU: the same triangles, camera, flat colours and depth test"},
+               {"fill", kFillRules[1]},
+               {"bound", kLlvmpipeBoundText},
+               {"bound_source", kLlvmpipeBoundSource},
+               {"available", false}};
+    if (!has_llvmpipe()) {
+      entry["reason"] = llvmpipe_missing();
+    } else {
+      constexpr double kTimeout = 60;  // seconds
+      try {
+        Environment environment;
+        environment.llvmpipe_threads = 1;
+        const Json answer =
+            Process({"runner"}, environment_variables(environment)).ask({{"op", "peer"}}, kTimeout);
+        if (answer.contains("skip"))
+          entry["reason"] = answer.at("skip");
+        else
+          entry["available"] = true, entry.update(answer);
+      } catch (const ProcessError& error) {
+        entry["reason"] = error.what();
+      }
+    }
+    list.push_back(std::move(entry));
+  }
   return list;
 }
 
@@ -137,9 +171,11 @@ void add_list_command(CLI::App& app) {
   const auto what = std::make_shared<std::string>();
   const auto json = std::make_shared<bool>(false);
   static const std::map<std::string, Json (*)()> kLists{
-      {"kernels", list_kernels},     {"numerics", list_numerics}, {"backends", list_backends},
-      {"schedules", list_schedules}, {"scenes", list_scenes},     {"studies", list_studies}};
-  command->add_option("WHAT", *what, "kernels, numerics, backends, schedules, scenes or studies")->required();
+      {"kernels", list_kernels},   {"peers", list_peers},         {"numerics", list_numerics},
+      {"backends", list_backends}, {"schedules", list_schedules}, {"scenes", list_scenes},
+      {"studies", list_studies}};
+  command->add_option("WHAT", *what, "kernels, peers, numerics, backends, schedules, scenes or studies")
+      ->required();
   command->add_flag("--json", *json, "an array of objects that have a \"name\"");
   command->callback([what, json] {
     std::vector<std::string> known;

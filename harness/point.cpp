@@ -26,9 +26,12 @@ int parse_integer(std::string_view text, int low, int high, const std::string& f
 
 constexpr int kMaxChunk = 1 << 30;
 
-/// Whether the frame has loops that are compiled for each instruction set: the geometry stage of screen
-/// triangles.
-bool is_vectorised(const std::string& numeric) { return find_mode(numeric)->has_screen_triangles; }
+bool has_tiles(const Point& point) { return !is_peer(point) && find_kernel(point.kernel).info().has_tiles; }
+
+/// Whether the frame has loops that are compiled for each instruction set: those of the geometry stage.
+bool is_vectorised(const Point& point) {
+  return !is_peer(point) && find_mode(point.numeric)->has_screen_triangles;
+}
 
 }  // namespace
 
@@ -59,6 +62,22 @@ FrameSettings Point::settings() const {
   return settings;
 }
 
+bool is_peer(const Point& point) {
+  return std::find(kPeers.begin(), kPeers.end(), point.kernel) != kPeers.end();
+}
+
+Point peer_point(const std::string& peer, const SceneReference& scene, int width, int height, int threads) {
+  Point point;
+  point.scene = scene;
+  point.width = width;
+  point.height = height;
+  point.kernel = point.numeric = point.execution.backend = peer;
+  point.fill = FillRule::kTopLeft;
+  point.execution.threads = threads;
+  point.environment.llvmpipe_threads = threads;
+  return point;
+}
+
 std::string point_name(const Point& p) {
   std::string name =
       fmt::format("{}/{}x{}/{}/{}/{}/{}/{}/{}", p.scene.name, p.width, p.height, p.kernel, p.numeric,
@@ -68,10 +87,10 @@ std::string point_name(const Point& p) {
   if (p.environment.binding != normal.binding) name += "/binding:" + p.environment.binding;
   if (p.environment.wait_policy != normal.wait_policy) name += "/wait:" + p.environment.wait_policy;
   if (p.environment.runtime != normal.runtime) name += "/runtime:" + p.environment.runtime;
-  if (find_kernel(p.kernel).info().has_tiles && p.tile != 64) name += fmt::format("/tile:{}", p.tile);
+  if (has_tiles(p) && p.tile != 64) name += fmt::format("/tile:{}", p.tile);
   if (p.cache != "warm") name += "/cache:" + p.cache;
   if (p.generality != Generality::kMinimal) name += "/generality:full";
-  if (is_vectorised(p.numeric) && p.isa != best_isa()) name += fmt::format("/isa:{}", to_string(p.isa));
+  if (is_vectorised(p) && p.isa != best_isa()) name += fmt::format("/isa:{}", to_string(p.isa));
   return name;
 }
 
@@ -90,8 +109,8 @@ Json point_config(const Point& p) {
   config["binding"] = p.environment.binding;
   config["wait_policy"] = p.environment.wait_policy;
   config["runtime"] = p.environment.runtime;
-  config["tile"] = find_kernel(p.kernel).info().has_tiles ? Json(p.tile) : Json();
-  config["isa"] = to_string(is_vectorised(p.numeric) ? p.isa : Isa::kBaseline);
+  config["tile"] = has_tiles(p) ? Json(p.tile) : Json();
+  config["isa"] = is_peer(p) ? "jit" : to_string(is_vectorised(p) ? p.isa : Isa::kBaseline);
   config["output"] = "rgba8+f32";
   config["cache"] = p.cache;
   config["generality"] = kGeneralities[p.generality == Generality::kFull];
@@ -119,11 +138,12 @@ Point point_from_json(const Json& json) {
   if (!json.at("schedule").is_null()) p.execution.schedule = json.at("schedule");
   if (!json.at("chunk").is_null()) p.execution.chunk = json.at("chunk").get<int>();
   p.execution.threads = json.at("threads");
-  p.environment = {json.at("binding"), json.at("wait_policy"), json.at("runtime")};
+  p.environment = {json.at("binding"), json.at("wait_policy"), json.at("runtime"),
+                   is_peer(p) ? p.execution.threads : 0};
   p.tile = json.at("tile");
   p.cache = json.at("cache");
   p.generality = parse_generality(json.at("generality"), "generality");
-  p.isa = parse_isa(json.at("isa"), "isa");
+  p.isa = is_vectorised(p) ? parse_isa(json.at("isa"), "isa") : Isa::kBaseline;
   return p;
 }
 

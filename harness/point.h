@@ -6,6 +6,7 @@
 
 #include "execution/execution.h"
 #include "pipeline/frame.h"
+#include "reference/llvmpipe.h"
 #include "scene/scene.h"
 
 namespace rasterbench {
@@ -28,7 +29,8 @@ struct Environment {
   std::string binding = "none";         ///< OMP_PROC_BIND: none, close, spread
   std::string wait_policy = "default";  ///< OMP_WAIT_POLICY: default, active, passive
   std::string runtime =
-      "default";  ///< the OpenMP runtime: default (what the build links), libomp by preloading it
+      "default";             ///< the OpenMP runtime: default (what the build links), libomp by preloading it
+  int llvmpipe_threads = 0;  ///< LP_NUM_THREADS, which Mesa reads once per process; 0: no llvmpipe
 
   auto operator<=>(const Environment&) const = default;
 };
@@ -41,6 +43,8 @@ inline const std::vector<std::string> kFillRules{"closed", "top-left"};
 inline const std::vector<std::string> kNearRules{"clip", "off"};
 inline const std::vector<std::string> kCaches{"warm", "cold"};
 inline const std::vector<std::string> kGeneralities{"minimal", "full"};
+/// Other programs that do the same job, drawn as they are: no kernels of ours.
+inline const std::vector<std::string> kPeers{kLlvmpipe};
 
 /// The text of `json`; bytes that are not UTF-8 (file names may hold any) are replaced, never an error.
 std::string dump(const Json& json, int indent = -1);
@@ -62,6 +66,12 @@ struct Point {
 
   FrameSettings settings() const;
 };
+
+/// Whether a peer draws the point. Its kernel, numeric and backend are the peer's name; it has a scene, a
+/// size and threads, and the environment that these ask for, and of every other axis the value that the peer
+/// has.
+bool is_peer(const Point& point);
+Point peer_point(const std::string& peer, const SceneReference& scene, int width, int height, int threads);
 
 /// "scene/WxH/kernel/numeric/fill/near/backend:schedule,chunk/threads" and the axes that differ from their
 /// defaults: what

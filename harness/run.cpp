@@ -131,7 +131,10 @@ Json make_record(const PointState& state, const Study& study, const std::string&
     for (const Sample& sample : state.samples) {
       launches.push_back(sample.launch);
       blocks.push_back(sample.block);
-      for (auto& [stage, values] : stages.items()) values.push_back(sample.answer.at("stages").at(stage));
+      for (auto& [stage, values] : stages.items()) {
+        const Json& part = sample.answer.at("stages").at(stage);
+        part.is_null() ? (void)(values = nullptr) : values.push_back(part);  // an absent stage is so in all
+      }
     }
   record["launches"] = launches;
   record["blocks"] = blocks;

@@ -9,6 +9,7 @@
 #include <iostream>
 
 #include "base/error.h"
+#include "harness/verdict_json.h"
 #include "harness/verify.h"
 #include "kernels/kernel.h"
 #include "scene/image.h"
@@ -46,8 +47,11 @@ void sweep_caches(Execution& execution) {
 class Runner {
  public:
   Json answer(const Json& request) {
-    const Point point = point_from_json(request.at("point"));
     const std::string op = request.at("op");
+    if (op == "peer") return unless_missing([] { return peer_json(llvmpipe_version()); });
+    const Point point = point_from_json(request.at("point"));
+    if (op == "verify" && is_peer(point))
+      return unless_missing([&] { return verifier_.judge(point, scene(point.scene)); });
     if (op == "verify") return verifier_.judge(point, scene(point.scene));
     if (op == "sample") return sample(point, request.at("name"), request.at("frames"));
     if (op == "image") return image(point, request.at("path").get<std::string>());
@@ -55,6 +59,16 @@ class Runner {
   }
 
  private:
+  /// Not to have what a peer needs is no error of the point.
+  template <class Answer>
+  static Json unless_missing(Answer answer) {
+    try {
+      return answer();
+    } catch (const InputError& error) {
+      return {{"skip", error.what()}};
+    }
+  }
+
   const Scene& scene(const SceneReference& reference) {
     auto found = scenes_.find(reference.name);
     if (found == scenes_.end())
@@ -62,17 +76,22 @@ class Runner {
     return found->second;
   }
 
+  std::unique_ptr<Renderer> new_renderer(const Point& point) {
+    const Scene& drawn = scene(point.scene);
+    if (is_peer(point)) return make_llvmpipe_renderer(drawn, point.settings());
+    return make_renderer(point.kernel, point.numeric, {&drawn, point.settings(), point.execution});
+  }
+
   /// One sample: a fresh renderer, one untimed frame, then `frames` timed ones as one iteration of a Google
   /// Benchmark run.
   Json sample(const Point& point, const std::string& name, int frames) {
-    const Scene& drawn = scene(point.scene);
     Json answer;
-    const auto probe = make_execution(point.execution);
-    answer["threads_observed"] = observe_threads(*probe).count;
-    const auto renderer =
-        make_renderer(point.kernel, point.numeric, {&drawn, point.settings(), point.execution});
+    const auto probe = is_peer(point) ? nullptr : make_execution(point.execution);
+    if (probe) answer["threads_observed"] = observe_threads(*probe).count;
+    const auto renderer = new_renderer(point);
     renderer->draw();
-    if (point.cache == "cold") sweep_caches(*probe);
+    if (!probe) answer["threads_observed"] = observed_llvmpipe_threads();  // its first frame starts them
+    if (probe && point.cache == "cold") sweep_caches(*probe);
 
     StageSeconds stages;
     const FrameReport* report = nullptr;  // of the last frame; read after the clock has stopped
@@ -107,6 +126,8 @@ class Runner {
                         {"geometry", stages.geometry * per_frame_ms},
                         {"raster", stages.raster * per_frame_ms},
                         {"resolve", stages.resolve * per_frame_ms}};
+    if (is_peer(point))  // one stage, from outside
+      for (const char* stage : {"clear", "geometry", "resolve"}) answer["stages"][stage] = nullptr;
     Json& threads = answer["per_thread"] = Json::array();
     for (const WorkerTally& worker : report->raster_tally)
       threads.push_back(
@@ -117,8 +138,7 @@ class Runner {
   }
 
   Json image(const Point& point, const std::string& path) {
-    const auto renderer =
-        make_renderer(point.kernel, point.numeric, {&scene(point.scene), point.settings(), point.execution});
+    const auto renderer = new_renderer(point);
     renderer->draw();
     write_image(path, renderer->colours(), point.width, point.height);
     return Json::object();
@@ -151,6 +171,7 @@ std::map<std::string, std::string> environment_variables(const Environment& envi
   for (char** variable = environ; *variable; ++variable)
     if (const std::string text(*variable); text.starts_with("BENCHMARK_"))
       variables[text.substr(0, text.find('='))] = "";
+  if (environment.llvmpipe_threads > 0) variables.merge(llvmpipe_variables(environment.llvmpipe_threads));
   if (environment.runtime == "libomp") {
     const std::string path = find_libomp();
     if (path.empty()) throw InputError("LLVM's OpenMP runtime (libomp) is not installed on this machine");

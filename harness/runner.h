@@ -13,8 +13,10 @@ namespace rasterbench {
 ///   {"op": "verify", "point": {...}}                  -> Verifier::judge
 ///   {"op": "sample", "point": {...}, "name", "frames"} -> {"ms", "stages", "per_thread", "threads_observed",
 ///   "counters"}
+///   {"op": "peer"}                                    -> {"renderer", "version"} of this process's llvmpipe
 ///   {"op": "image", "point": {...}, "path"}           -> {} after writing the picture
-/// A request that fails is answered {"error": text}. `benchmark_flags` go to Google Benchmark.
+/// What a peer cannot do on this machine is answered {"skip": reason}; a request that fails, {"error": text}.
+/// `benchmark_flags` go to Google Benchmark.
 int run_runner(const std::vector<std::string>& benchmark_flags);
 
 /// The variables that make a process an environment; throws InputError with the reason where the machine

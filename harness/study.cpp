@@ -21,15 +21,17 @@ constexpr double kSecondsPerTest = 1.0e-9;
 /// Why a point will not run, or empty.
 std::string reason_to_skip(const Point& point, const Scene& scene, const SamplingPlan& sampling,
                            bool oversubscribe) {
+  const bool too_many_threads = point.execution.threads > available_cpus() && !oversubscribe;
+  const std::string too_many =
+      fmt::format("{} threads on {} CPUs needs --oversubscribe", point.execution.threads, available_cpus());
+  if (is_peer(point)) return !has_llvmpipe() ? llvmpipe_missing() : too_many_threads ? too_many : "";
   const Kernel& kernel = find_kernel(point.kernel);
   const Kernel::Variant& variant = kernel.variant(point.numeric);
   if (!variant.make)
     return fmt::format("{} cannot run in mode {}: {}", point.kernel, point.numeric, variant.reason);
   if (is_left_out(point.execution.backend))
     return fmt::format("this build has no backend {}", point.execution.backend);
-  if (point.execution.threads > available_cpus() && !oversubscribe)
-    return fmt::format("{} threads on {} CPUs needs --oversubscribe", point.execution.threads,
-                       available_cpus());
+  if (too_many_threads) return too_many;
   if (point.execution.backend == "tbb" && point.environment != Environment{})
     return "binding, wait policy and runtime are OpenMP's; OMP_PROC_BIND would narrow oneTBB to one worker";
   if (!is_supported(point.isa)) return fmt::format("this CPU has no {}", to_string(point.isa));
@@ -50,6 +52,11 @@ std::string reason_to_skip(const Point& point, const Scene& scene, const Samplin
           frame, sampling.point_seconds);
   }
   return {};
+}
+
+/// The axes that a peer shares with kernels.
+std::string picture_of(const Point& point) {
+  return fmt::format("{}/{}x{}", point.scene.name, point.width, point.height);
 }
 
 /// The place of `name` in `seen`, where it is put if it is new.
@@ -94,7 +101,7 @@ Study read_study(const std::filesystem::path& file, const StudyOptions& options)
   if (options.time_limit) study.sampling.time_limit = *options.time_limit;
   const std::vector<Sweep> sweeps = read_sweeps(file, study.text, options.scenes, options.sizes);
 
-  std::set<std::string> names, trades;  // trades: those with a literal program
+  std::set<std::string> names, trades, pictures;  // trades with a literal program, pictures with a peer
   std::vector<PlannedPoint> all;
   std::map<std::string, SceneReference> references;
   for (const Sweep& sweep : sweeps) {
@@ -121,6 +128,7 @@ Study read_study(const std::filesystem::path& file, const StudyOptions& options)
       if (!names.insert(planned.name).second) return;
       if (options.filter && std::regex_search(planned.name, *options.filter) == options.filter_excludes)
         return;
+      if (is_peer(point)) pictures.insert(picture_of(point));
       if (is_literal_program(point)) trades.insert(trade_of(point));
       all.push_back(std::move(planned));
     });
@@ -129,8 +137,11 @@ Study read_study(const std::filesystem::path& file, const StudyOptions& options)
   for (PlannedPoint& planned : all) {
     const Point& point = planned.point;
     const std::string trade = trade_of(point);
-    const std::size_t comparison =
-        index_of(trades.contains(trade) ? trade : comparison_of(point), comparisons);
+    const std::string picture = picture_of(point);
+    const std::size_t comparison = index_of(pictures.contains(picture) ? picture
+                                            : trades.contains(trade)   ? trade
+                                                                       : comparison_of(point),
+                                            comparisons);
     if (comparison % static_cast<std::size_t>(options.shards) != static_cast<std::size_t>(options.shard - 1))
       continue;
     planned.skip =

@@ -58,8 +58,8 @@ struct StudyOptions {
 Study read_study(const std::filesystem::path& file, const StudyOptions& options);
 
 /// What `point` is compared with: equal for points that differ only in strategy, execution and environment.
-/// Shards hold whole comparisons, bases included (where there is a literal program, all of its trade), so
-/// that a speedup never compares two machines.
+/// Shards hold whole comparisons, bases included (where there is a literal program, all of its trade; where
+/// there is a peer, all of its scene and size), so that a speedup never compares two machines.
 std::string comparison_of(const Point& point);
 
 /// comparison_of() without the numeric mode: what the literal program is the base of.

@@ -248,6 +248,11 @@ Sweep read_sweep(const toml::table& table, const std::string& file, const std::f
     if (word != "all") find_kernel(word);
     return word;
   });
+  reader.strings("peer", sweep.peers, [](const std::string& word) {
+    if (std::find(kPeers.begin(), kPeers.end(), word) == kPeers.end())
+      throw InputError(unknown_name("peer", word, kPeers));
+    return word;
+  });
   std::vector<std::string> modes{"all"};
   for (const ModeInfo& info : mode_infos()) modes.emplace_back(info.name);
   reader.words("numeric", modes, "f32", sweep.numerics);
@@ -294,8 +299,10 @@ Sweep read_sweep(const toml::table& table, const std::string& file, const std::f
   reader.strings("isa", sweep.isas, [](const std::string& s) { return parse_isa(s, "isa"); });
   reader.reject_unknown_keys("[[sweep]]");
 
-  if (sweep.kernels.empty()) reader.fail(table, "kernel", "is missing from this [[sweep]]");
-  if (sweep.executions.empty()) reader.fail(table, "execution", "is missing from this [[sweep]]");
+  if (sweep.kernels.empty() && sweep.peers.empty())
+    reader.fail(table, "kernel", "is missing from this [[sweep]], which has no peer either");
+  if (sweep.executions.empty() && !sweep.kernels.empty())
+    reader.fail(table, "execution", "is missing from this [[sweep]]");
   if (sweep.fills.empty()) sweep.fills.push_back(FillRule::kClosed);
   if (sweep.nears.empty()) sweep.nears.push_back(NearRule::kClip);
   if (sweep.threads.empty()) sweep.threads = {available_cpus()};
@@ -383,7 +390,7 @@ void span_points(const Sweep& sweep, const std::map<std::string, Scene>& scenes,
     std::vector<std::pair<int, int>> sizes = sweep.sizes;
     const SceneParameters& own = scenes.at(scene.name).parameters;
     if (sizes.empty()) sizes.emplace_back(own.width, own.height);
-    for (const auto& [width, height] : sizes)
+    for (const auto& [width, height] : sizes) {
       for (const std::string& numeric : sweep.numerics)
         for (const FillRule fill : sweep.fills)
           for (const NearRule near_rule : sweep.nears)
@@ -400,6 +407,9 @@ void span_points(const Sweep& sweep, const std::map<std::string, Scene>& scenes,
                           point.execution.threads = threads;
                           visit(point);
                         }
+      for (const std::string& peer : sweep.peers)
+        for (const int threads : sweep.threads) visit(peer_point(peer, scene, width, height, threads));
+    }
   }
 }
 

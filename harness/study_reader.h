@@ -15,6 +15,7 @@ struct Sweep {
   std::vector<SceneReference> scenes;
   std::vector<std::pair<int, int>> sizes;  ///< empty: each scene's own
   std::vector<std::string> kernels;
+  std::vector<std::string> peers;
   std::vector<std::string> numerics;
   std::vector<FillRule> fills;
   std::vector<NearRule> nears;
@@ -36,7 +37,7 @@ std::vector<Sweep> read_sweeps(const std::filesystem::path& file, const std::str
 
 /// Calls `visit` for every combination of a sweep. An axis that does not apply to a point is not multiplied:
 /// serial has one thread, kernels without tiles one tile size, and modes without screen triangles no geometry
-/// stage that could be more or less general.
+/// stage that could be more or less general. Peers have scene, size and threads only.
 void span_points(const Sweep& sweep, const std::map<std::string, Scene>& scenes,
                  const std::function<void(const Point&)>& visit);
 

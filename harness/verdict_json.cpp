@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "pipeline/resolve.h"
 
 namespace rasterbench {
 namespace {
@@ -124,6 +125,54 @@ Json judge_picture(Judge& judge, const Picture& picture, const ModeInfo& mode) {
   }
   json["bound"] = {{"bounded", mode.numbers.bounded}, {"text", mode.bound}, {"source", mode.bound_source}};
   json["failure"] = failure.empty() ? Json() : Json(failure);
+  return json;
+}
+
+Json peer_json(const LlvmpipeVersion& version) {
+  return {{"renderer", version.renderer}, {"version", version.version}};
+}
+
+Json judge_peer_picture(Judge& judge, const Picture& picture) {
+  const Scene& scene = judge.scene();
+  const EndToEndTruth& truth = judge.truth();
+  const Comparison comparison =
+      compare_with_double(truth.truth, picture.ids, picture.depths, scene.model.triangles, judge.camera(),
+                          judge.settings().geometry.near_rule, llvmpipe_bound());
+  EndToEndVerdict verdict{.pixels = comparison.pixels,
+                          .identical = comparison.identical,
+                          .edge_ties = comparison.edge_ties,
+                          .depth_ties = comparison.depth_ties,
+                          .errors = comparison.errors,
+                          .max_depth_error_steps = comparison.max_depth_error_steps,
+                          .worst_pixel = comparison.worst_pixel};
+  for (std::size_t i = 0; i < truth.decided.size(); ++i) {
+    if (truth.decided[i] != DecidedBy::kAmbiguous) continue;
+    const PixelVerdict of_pixel = comparison.verdicts[i];
+    --(of_pixel == PixelVerdict::kIdentical  ? verdict.identical
+       : of_pixel == PixelVerdict::kEdgeTie  ? verdict.edge_ties
+       : of_pixel == PixelVerdict::kDepthTie ? verdict.depth_ties
+                                             : verdict.errors);
+    ++verdict.ambiguous;
+  }
+  std::int64_t other_colours = 0;
+  for (std::size_t i = 0; i < picture.ids.size(); ++i) {
+    const std::int32_t id = picture.ids[i];
+    other_colours +=
+        picture.colours[i] !=
+        (id < 0 ? pack_rgba(scene.parameters.background)
+                : shade_flat(scene.model.triangles[static_cast<std::size_t>(id)], scene.parameters.object));
+  }
+  Json json;
+  for (const char* name : kVerdicts) json[name] = nullptr;
+  json["end_to_end"] = end_to_end_json(verdict, truth);
+  json["bound"] = {{"bounded", true}, {"text", kLlvmpipeBoundText}, {"source", kLlvmpipeBoundSource}};
+  json["failure"] = nullptr;
+  if (verdict.errors > 0)
+    json["failure"] =
+        fmt::format("{} pixels differ from the end-to-end truth beyond the bound of {}, one at {}",
+                    verdict.errors, kLlvmpipe, place(verdict.worst_pixel, judge.settings().width));
+  else if (other_colours > 0)
+    json["failure"] = fmt::format("{} pixels have another colour than their triangle", other_colours);
   return json;
 }
 

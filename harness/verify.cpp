@@ -12,6 +12,10 @@
 namespace rasterbench {
 namespace {
 
+std::int64_t covered_pixels(const Picture& picture) {
+  return std::count_if(picture.ids.begin(), picture.ids.end(), [](std::int32_t id) { return id >= 0; });
+}
+
 Json work_json(const GeometryCounts& c, const Picture& specification, std::size_t bytes) {
   Json work;
   work["triangles"] = c.triangles;
@@ -24,8 +28,7 @@ Json work_json(const GeometryCounts& c, const Picture& specification, std::size_
   work["guard_clipped"] = c.guard_clipped;
   work["fragments_tested"] = specification.samples_tested;
   work["fragments_covered"] = specification.samples_covered;
-  work["covered_pixels"] = std::count_if(specification.ids.begin(), specification.ids.end(),
-                                         [](std::int32_t id) { return id >= 0; });
+  work["covered_pixels"] = covered_pixels(specification);
   work["bytes"] = bytes;
   return work;
 }
@@ -82,7 +85,33 @@ const Verifier::Expected& Verifier::expected(const Point& point, const Scene& sc
   return expected_;
 }
 
+Json Verifier::judge_peer(const Point& point, const Scene& scene) {
+  const FrameSettings settings = point.settings();
+  const auto renderer = make_llvmpipe_renderer(scene, settings);
+  renderer->draw();  // compiles the shaders
+  Json answer;
+  answer["frame_ms"] = renderer->draw().seconds.total() * 1e3;
+  answer["threads_observed"] = observed_llvmpipe_threads();
+  const Picture picture = picture_of(*renderer, settings);
+  answer["picture"] = picture_hash(*renderer);
+  answer["work"] = {{"triangles", scene.model.triangles.size()},
+                    {"covered_pixels", covered_pixels(picture)},
+                    {"bytes", renderer->bytes()}};
+  const Json verdicts = judge_peer_picture(judge_of(point, scene), picture);
+  Json& verify = answer["verify"];
+  verify["conforms"] = nullptr;
+  verify["checked_against"] = "end-to-end truth, by the peer's own bound; colours against ids";
+  verify["differing_pixels"] = nullptr;
+  for (const char* verdict : kVerdicts) verify[verdict] = verdicts.at(verdict);
+  verify["peer"] = peer_json(llvmpipe_version());
+  answer["failure"] = verdicts.at("failure");
+  if (const int observed = answer["threads_observed"]; observed < point.execution.threads)
+    answer["failure"] = fmt::format("{} of {} threads ran", observed, point.execution.threads);
+  return answer;
+}
+
 Json Verifier::judge(const Point& point, const Scene& scene) {
+  if (is_peer(point)) return judge_peer(point, scene);
   const FrameSettings settings = point.settings();
   const Expected& expect = expected(point, scene);
   Json answer;

@@ -19,7 +19,7 @@ CPUS = len(os.sched_getaffinity(0))
 TIMEOUT = 120  # seconds: a hang fails the test, whatever else the machine does
 
 # What would change the programs' threads, schedules or answers behind a test's back.
-_SHED = ("OMP_", "GOMP_", "KMP_", "TBB_", "LD_PRELOAD", "MALLOC_")
+_SHED = ("OMP_", "GOMP_", "KMP_", "TBB_", "LD_PRELOAD", "MALLOC_", "LP_", "GALLIUM_", "MESA_", "LIBGL_")
 
 
 def program(name: str = "rasterbench") -> Path:
