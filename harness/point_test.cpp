@@ -42,6 +42,23 @@ TEST(Point, SurvivesJson) {
   EXPECT_FALSE(back.execution.chunk);
 }
 
+TEST(Point, PeersHaveAProcessForEachNumberOfThreads) {
+  const Point one = peer_point("llvmpipe", parse_scene_reference("teapot"), 64, 48, 1);
+  const Point two = peer_point("llvmpipe", parse_scene_reference("teapot"), 64, 48, 2);
+  EXPECT_TRUE(is_peer(one));
+  EXPECT_FALSE(is_peer(Point{}));
+  EXPECT_EQ(point_name(two), "teapot/64x48/llvmpipe/llvmpipe/top-left/clip/llvmpipe/2");
+  EXPECT_NE(one.environment, two.environment);
+  EXPECT_NE(one.environment, Environment{});
+  for (const Point& point : {one, two}) {
+    const Point back = point_from_json(Json::parse(point_to_json(point).dump()));
+    EXPECT_EQ(point_name(back), point_name(point));
+    EXPECT_EQ(back.environment, point.environment);
+  }
+  EXPECT_TRUE(point_config(one).at("schedule").is_null());
+  EXPECT_TRUE(point_config(one).at("tile").is_null());
+}
+
 TEST(Point, SceneReferences) {
   EXPECT_EQ(parse_scene_reference("a/city.dat@a/city_street.txt").name, "city@city_street");
   EXPECT_EQ(parse_scene_reference("a/city.dat@b/city.txt").name, "city");

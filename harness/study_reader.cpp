@@ -301,6 +301,11 @@ Sweep read_sweep(const toml::table& table, const std::string& file, const std::f
 
   if (sweep.kernels.empty() && sweep.peers.empty())
     reader.fail(table, "kernel", "is missing from this [[sweep]], which has no peer either");
+  if (sweep.kernels.empty())
+    for (const char* axis : {"numeric", "fill", "near", "execution", "chunk", "binding", "wait_policy",
+                             "runtime", "tile", "cache", "generality"})
+      if (const toml::node* node = table.get(axis))
+        reader.fail(*node, axis, "is an axis of kernels, of which this [[sweep]] has none");
   if (sweep.executions.empty() && !sweep.kernels.empty())
     reader.fail(table, "execution", "is missing from this [[sweep]]");
   if (sweep.fills.empty()) sweep.fills.push_back(FillRule::kClosed);

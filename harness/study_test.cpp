@@ -61,6 +61,31 @@ threads = [1, 1]
           "tile_parallel/f32/closed/clip/openmp:static,4/1", "tile_parallel/f32/closed/clip/openmp:auto/1"}));
 }
 
+TEST_F(StudyTest, PeersHaveSceneSizeAndThreadsOnly) {
+  const Study study = read(kSweep + R"(
+kernel = "tile_parallel"
+peer = "llvmpipe"
+numeric = ["f32", "f64"]
+fill = ["closed", "top-left"]
+execution = ["serial"]
+cache = ["warm", "cold"]
+threads = [1, 2]
+)");
+  const auto peers = std::count_if(study.points.begin(), study.points.end(),
+                                   [](const PlannedPoint& planned) { return is_peer(planned.point); });
+  EXPECT_EQ(peers, 2);
+  EXPECT_EQ(study.points.size(), 10u);
+  for (const PlannedPoint& planned : study.points) {
+    EXPECT_FALSE(is_literal_program(planned.point));
+    if (is_peer(planned.point) && !has_llvmpipe()) {
+      EXPECT_EQ(planned.skip, llvmpipe_missing());
+    }
+  }
+  EXPECT_NE(error_of(kSweep + "peer = \"llvmpipe\"\nfill = \"closed\"\n").find("fill: is an axis of kernels"),
+            std::string::npos);
+  EXPECT_NE(error_of(kSweep + "peer = \"mesa\"\n").find("unknown peer 'mesa'"), std::string::npos);
+}
+
 TEST_F(StudyTest, SkipsWithReasons) {
   const Study study = read(kSweep + R"(
 kernel = ["all_pixels", "triangle_atomics"]

@@ -2,22 +2,24 @@
 // pictures are judged by.
 //
 // The vertex shader multiplies by the camera's rows, rounded to float32, and everything up to the window
-// coordinates is in float32 as well, at most as many roundings as the double pipeline has. Coverage is in
-// integers, exact on corners that are snapped to 1/256 px (subpixel_snap() and FIXED_ORDER = 8 in
-// src/gallium/drivers/llvmpipe/lp_setup_tri.c and lp_rast.h of Mesa 22.3). Depth is a plane through the
-// unsnapped corners, a0 + dadx x + dady y from the window's origin (lp_state_setup.c, lp_bld_interp.c), some
-// ten roundings of float32, which two of twice the unit each cover; it is stored as (d + 1) / 2, of which a
-// unit is two of d.
+// coordinates is in float32 as well. Footprint counts 64 roundings, 31 of the picture that is judged, as many
+// of the truth, which here is in double, and two to spare: half the unit makes them the 32 of llvmpipe, the
+// rounding of the rows included. Coverage is in integers, exact on corners that are snapped to 1/256 px
+// (subpixel_snap() in lp_setup_tri.c, FIXED_ORDER in lp_rast.h, both in src/gallium/drivers/llvmpipe). Depth
+// is a plane through the unsnapped corners, a0 + dadx x + dady y from the window's origin (lp_state_setup.c;
+// a later Mesa starts from the first corner, which is nearer); its ten roundings of float32 are five of twice
+// the unit. It is stored as (d + 1) / 2, of which a unit is two of d.
 #include "reference/llvmpipe.h"
 
 namespace rasterbench {
 
 const char* const kLlvmpipeBoundText =
-    "edges within 0.707/256 px (corners snapped to 8 bits of subpixels) plus 64 float32 roundings of the "
-    "transform, gamma_64 (|row| |P|) / w in pixels; depth within the rounding of a float32 plane from the "
+    "edges within 0.707/256 px (corners snapped to 8 bits of subpixels) plus 32 float32 roundings of the "
+    "transform, gamma_32 (|row| |P|) / w in pixels; depth within the rounding of a float32 plane from the "
     "window's origin and the same transform";
 const char* const kLlvmpipeBoundSource =
-    "Mesa 22.3, src/gallium/drivers/llvmpipe: FIXED_ORDER (lp_rast.h), lp_state_setup.c; Higham 2002, 3.1";
+    "Mesa, src/gallium/drivers/llvmpipe: FIXED_ORDER in lp_rast.h, lp_setup_tri.c, lp_state_setup.c; Higham "
+    "2002, 3.1";
 
 std::map<std::string, std::string> llvmpipe_variables(int threads) {
   return {{"LIBGL_ALWAYS_SOFTWARE", "1"},
@@ -38,7 +40,7 @@ PictureBound llvmpipe_bound() {
                                .edge_form = EdgeForm::kExact,
                                .edge_unit = 0,
                                .depth_unit = 0x1p-23});
-  bound.geometry_unit = 0x1p-24;
+  bound.geometry_unit = 0x1p-25;
   bound.depth_from_origin = true;
   return bound;
 }
