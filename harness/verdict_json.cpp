@@ -157,6 +157,7 @@ Json judge_peer_picture(Judge& judge, const Picture& picture) {
   std::int64_t other_colours = 0;
   for (std::size_t i = 0; i < picture.ids.size(); ++i) {
     const std::int32_t id = picture.ids[i];
+    if (id >= std::ssize(scene.model.triangles)) continue;  // an error already
     other_colours +=
         picture.colours[i] !=
         (id < 0 ? pack_rgba(scene.parameters.background)

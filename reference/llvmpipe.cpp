@@ -157,13 +157,19 @@ bool is_finite(const Triangle& t) {
   });
 }
 
-/// A framebuffer object of the picture's size; complete, or InputError.
-GLuint make_framebuffer(GLsizei width, GLsizei height) {
-  GLuint framebuffer = 0;
+/// A framebuffer object and its two renderbuffers.
+struct Framebuffer {
+  GLuint name = 0;
   std::array<GLuint, 2> attachments{};
-  glGenFramebuffers(1, &framebuffer);
+};
+
+/// Of the picture's size; bound and complete, or InputError.
+Framebuffer make_framebuffer(GLsizei width, GLsizei height) {
+  Framebuffer framebuffer;
+  auto& attachments = framebuffer.attachments;
+  glGenFramebuffers(1, &framebuffer.name);
   glGenRenderbuffers(2, attachments.data());
-  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
+  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer.name);
   const std::array<std::pair<GLenum, GLenum>, 2> formats{
       {{GL_RGBA8, GL_COLOR_ATTACHMENT0}, {GL_DEPTH_COMPONENT32F, GL_DEPTH_ATTACHMENT}}};
   for (std::size_t i = 0; i < formats.size(); ++i) {
@@ -175,6 +181,11 @@ GLuint make_framebuffer(GLsizei width, GLsizei height) {
   if (glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE)
     refuse(fmt::format("no framebuffer of {}x{} with RGBA8 and 32-bit float depth", width, height));
   return framebuffer;
+}
+
+void delete_framebuffer(const Framebuffer& framebuffer) {
+  glDeleteFramebuffers(1, &framebuffer.name);
+  glDeleteRenderbuffers(2, framebuffer.attachments.data());
 }
 
 /// A vertex buffer of `colours`, one a triangle, as the flat attribute of its three corners.
@@ -215,7 +226,7 @@ class LlvmpipeRenderer final : public Renderer {
     glUseProgram(program);
     const std::array<float, 16> matrix = clip_matrix(sized_camera(scene, settings));
     glUniformMatrix4fv(glGetUniformLocation(program, "world_to_clip"), 1, GL_TRUE, matrix.data());
-    framebuffer_ = make_framebuffer(width_, height_);
+    framebuffer_ = make_framebuffer(width_, height_).name;
     upload(scene);
     glViewport(0, 0, width_, height_);
     glEnable(GL_DEPTH_TEST);
@@ -249,7 +260,7 @@ class LlvmpipeRenderer final : public Renderer {
 
   std::vector<std::int32_t> ids() const override {
     read_back();
-    const GLuint framebuffer = make_framebuffer(width_, height_);
+    const Framebuffer framebuffer = make_framebuffer(width_, height_);
     std::vector<std::uint32_t> codes(triangles_);  // id + 1, all 32 bits of RGBA8; 0 is the background
     for (std::size_t i = 0; i < triangles_; ++i) codes[i] = static_cast<std::uint32_t>(i) + 1;
     const GLuint buffer = upload_colours(codes);
@@ -260,7 +271,7 @@ class LlvmpipeRenderer final : public Renderer {
     bind_colours(colour_buffer_);
     glDeleteBuffers(1, &buffer);
     glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_);
-    glDeleteFramebuffers(1, &framebuffer);
+    delete_framebuffer(framebuffer);
     check_gl("the picture of ids");
     if (!same) throw Error("llvmpipe: the picture of ids has other depths than the frame");
     std::vector<std::int32_t> ids(pixels_);
