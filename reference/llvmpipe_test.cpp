@@ -1,6 +1,7 @@
 #include "reference/llvmpipe.h"
 
 #include <gtest/gtest.h>
+#include <sys/wait.h>
 
 #include <algorithm>
 #include <array>
@@ -170,6 +171,28 @@ TEST_F(Llvmpipe, OneThreadIsTheApplications) {
   EXPECT_EQ(observed_llvmpipe_threads(), 1);
   EXPECT_EQ(llvmpipe_variables(1).at("LP_NUM_THREADS"), "0");
   EXPECT_EQ(llvmpipe_variables(3).at("LP_NUM_THREADS"), "3");
+}
+
+// In a process of its own, since Mesa chooses its driver once: the answer is a refusal, or there is no
+// softpipe.
+TEST(LlvmpipeDeathTest, RefusesAnotherDriver) {
+  if (!has_llvmpipe()) GTEST_SKIP() << llvmpipe_missing();
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  constexpr int kRefused = 3, kNoOther = 4;
+  EXPECT_EXIT(
+      {
+        setenv("LIBGL_ALWAYS_SOFTWARE", "1", 1);
+        setenv("GALLIUM_DRIVER", "softpipe", 1);
+        try {
+          std::exit(llvmpipe_version().renderer.find("llvmpipe") != std::string::npos ? kNoOther : 0);
+        } catch (const InputError& error) {
+          std::exit(std::string(error.what()).starts_with("llvmpipe: ") ? kRefused : 1);
+        }
+      },
+      [](int status) {
+        return WIFEXITED(status) && (WEXITSTATUS(status) == kRefused || WEXITSTATUS(status) == kNoOther);
+      },
+      "");
 }
 
 }  // namespace
