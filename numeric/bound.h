@@ -25,11 +25,8 @@ struct ModeBound {
   double reciprocal_error = 0;     ///< relative error of 1 / area where it is approximated, else 0
   double depth_unit = 0x1p-24;     ///< unit roundoff of the depth at a sample, and of its format
   double depth_step = 0;           ///< distance of neighbouring depths of a fixed-point format, else 0
-  /// Rounding of a corner's depth in units of d beyond vertex_unit, where another function of it is stored:
-  /// of no mode by itself, but of its depth function and a camera (reference/judge.cpp).
-  double corner_depth_error = 0;
-  bool exact_winner = false;  ///< the nearest triangle is that of exact arithmetic
-  bool bounded = true;        ///< false: nothing is promised ("unbounded")
+  bool exact_winner = false;       ///< the nearest triangle is that of exact arithmetic
+  bool bounded = true;             ///< false: nothing is promised ("unbounded")
 };
 
 }  // namespace rasterbench

@@ -38,6 +38,8 @@ struct PictureBound : ModeBound {
   /// The depth at a sample is d0 + gx x + gy y from the image's origin, unclamped, in [-1, 1]; not from a
   /// corner, clamped to the corners' depths.
   bool depth_from_origin = false;
+  /// Rounding of a corner's depth in units of d beyond vertex_unit, where another function of it is stored.
+  double corner_depth_error = 0;
 };
 
 /// What explains a pixel of a comparison.

@@ -141,11 +141,9 @@ const Comparison& Judge::oracle_against_truth(const ModeInfo& mode) {
                    return id < 0 ? 1.0f : static_cast<float>(map.offset + map.scale * value);
                  });
   // Exact arithmetic on rounded vertices: what is left of the footprint's tolerance is the vertices' own.
-  const ModeBound vertices{.vertex_unit = mode.numbers.vertex_unit,
-                           .edge_unit = 0,
-                           .gradient_unit = 0,
-                           .depth_unit = 0,
-                           .corner_depth_error = corner_depth_error(camera_, mode)};
+  PictureBound vertices(ModeBound{
+      .vertex_unit = mode.numbers.vertex_unit, .edge_unit = 0, .gradient_unit = 0, .depth_unit = 0});
+  vertices.corner_depth_error = corner_depth_error(camera_, mode);
   return geometry_[key] = compare_with_double(truth().truth, exact.ids, depths, scene_.model.triangles,
                                               camera_, settings_.geometry.near_rule, vertices);
 }
