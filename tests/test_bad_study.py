@@ -37,9 +37,10 @@ runtime = ["default"]
 tile = [64]
 cache = ["warm"]
 generality = ["minimal"]
+isa = ["best"]
 """
 AXES = ["size", "kernel", "numeric", "fill", "near", "execution", "chunk", "threads", "binding", "wait_policy", "runtime", "tile", "cache",
-        "generality"]
+        "generality", "isa"]
 
 
 @pytest.fixture
@@ -105,6 +106,7 @@ def test_the_study_is_good_before_it_is_spoilt(folder: Path) -> None:
     ("tile", "tile = 16.0", ["tile: "]),
     ("cache", 'cache = "hot"', ["cache: "]),
     ("generality", 'generality = "ful"', ["generality: ", "full"]),
+    ("isa", 'isa = "avx51"', ["isa: ", "did you mean 'avx512'"]),
     ("seed", "seed = -1", ["seed: ", "whole number from 0"]),
     ("seed", "seed = 1.5", ["seed: ", "whole number"]),
     ("target", "target = 0", ["target: ", "a number from"]),

@@ -11,7 +11,7 @@ import pytest
 
 from .program import CPUS, ROOT, read_dat, read_parameters, run
 
-WORDS = ["kernels", "numerics", "backends", "schedules", "scenes", "studies"]
+WORDS = ["kernels", "numerics", "backends", "schedules", "isas", "scenes", "studies"]
 KERNELS = {"all_pixels", "bounding_box", "triangle_locks", "triangle_atomics", "triangle_private", "row_parallel", "tile_parallel", "scanline"}
 GENERATORS = ["teapot:triangles=500", "terrain:triangles=800,seed=3", "confetti:triangles=300,distribution=heavy,seed=2",
               "layers:triangles=200,depth=3,order=random"]

@@ -13,7 +13,7 @@ import pytest
 
 from . import course_pipeline
 from .conftest import SmallScene
-from .program import ROOT, Parameters, read_png, read_ppm, run, write_dat
+from .program import ROOT, Parameters, read_png, read_ppm, refused, run, write_dat
 
 STEP = 2.0**-24  # of a depth
 NUMERICS = ("f32", "f64", "fixed_8")
@@ -114,6 +114,20 @@ def test_every_kernel_and_execution_draws_the_same_bits(fill: str, numeric: str,
     first = next(iter(pictures))
     different = [label for label, picture in pictures.items() if picture != pictures[first]]
     assert not different, f"differ from {first}"
+
+
+@pytest.mark.parametrize("kernel, numeric", [("tile_simd", "fixed_8"), ("tile_parallel", "fixed_8"), ("bounding_box", "f64")])
+def test_every_instruction_set_draws_the_same_bits(kernel: str, numeric: str, crossing: SmallScene, tmp_path: Path) -> None:
+    pictures = {}
+    for isa in listed("isas"):
+        options = ("--kernel", kernel, "--numeric", numeric, "--isa", isa["name"], "--fill", "top-left", "--size", "201x77")
+        if isa["available"]:
+            render(crossing, tmp_path, *options)
+            pictures[isa["name"]] = b"".join((tmp_path / f).read_bytes() for f in ("ids.npy", "depth.npy", "image.ppm"))
+        else:
+            refused(run("render", crossing.dat, *options), "--isa", isa["name"])
+    assert "baseline" in pictures and len(set(pictures.values())) == 1
+    assert [isa["name"] for isa in listed("isas") if isa["best"]] == [list(pictures)[-1]]
 
 
 def test_options_change_the_picture(crossing: SmallScene, tmp_path: Path) -> None:

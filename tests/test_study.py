@@ -17,6 +17,7 @@ from .program import CPUS, events, json_lines, read_png, records, run, sampling,
 Record = dict[str, Any]
 STAGES = ["clear", "geometry", "raster", "resolve"]
 SMALL = "teapot:triangles=300"
+ISAS = [isa["name"] for isa in json.loads(run("list", "isas", "--json").ok().stdout) if isa["available"]]
 LIBOMP = any(Path(p).exists() for p in ("/usr/lib/x86_64-linux-gnu/libomp.so.5", "/usr/lib/aarch64-linux-gnu/libomp.so.5",
                                         "/usr/lib64/libomp.so", "/usr/lib/libomp.so"))
 needs_two_cpus = pytest.mark.skipif(CPUS < 2, reason="this machine has one CPU")
@@ -63,7 +64,8 @@ def mixed(tmp_path_factory: pytest.TempPathFactory) -> Study:
                  sweep("row_parallel", many, threads=1, runtime="libomp"),
                  sweep("tile_parallel", "serial", near="off", tile=[16, 32]),
                  sweep("scanline", "serial", cache=["warm", "cold"]),
-                 sweep("bounding_box", "serial", generality=["minimal", "full"]))
+                 sweep("bounding_box", "serial", generality=["minimal", "full"]),
+                 sweep(["tile_parallel", "tile_simd"], "serial", numeric="fixed_8", isa=ISAS))
 
 
 @pytest.fixture(params=["good", "mixed"])
@@ -136,11 +138,11 @@ def test_config_values(study: Study) -> None:
         c = r["config"]
         assert c["fill"] in ("closed", "top-left") and c["near"] in ("clip", "off") and c["cache"] in ("warm", "cold")
         assert c["output"] == "rgba8+f32" and len(c["size"]) == 2 and all(isinstance(side, int) for side in c["size"])
-        assert (c["schedule"] is None) == (c["backend"] == "serial") and (c["tile"] is None) == (c["kernel"] != "tile_parallel")
+        assert (c["schedule"] is None) == (c["backend"] == "serial") and (c["tile"] is None) == (c["kernel"] not in ("tile_parallel", "tile_simd"))
         schedule = c["backend"] + (f":{c['schedule']}" if c["schedule"] else "") + (f",{c['chunk']}" if c["chunk"] else "")
         parts = [c["scene"], f"{c['size'][0]}x{c['size'][1]}", c["kernel"], c["numeric"], c["fill"], c["near"], schedule, str(c["threads"])]
         for key, label, usual in (("binding", "binding", "none"), ("wait_policy", "wait", "default"), ("runtime", "runtime", "default"),
-                                  ("tile", "tile", 64), ("cache", "cache", "warm"), ("generality", "generality", "minimal")):
+                                  ("tile", "tile", 64), ("cache", "cache", "warm"), ("generality", "generality", "minimal"), ("isa", "isa", ISAS[-1])):
             if c[key] not in (usual, None):
                 parts.append(f"{label}:{c[key]}")
         assert r["name"] == "/".join(parts)
