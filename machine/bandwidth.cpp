@@ -1,24 +1,22 @@
 #include "machine/bandwidth.h"
 
-#include <fmt/format.h>
 #include <hwloc.h>
 #include <sys/mman.h>
 
 #include <algorithm>
 #include <chrono>
-#include <memory>
 
 #include "base/buffer.h"
-#include "base/error.h"
-#include "execution/execution.h"
 #include "machine/loops.h"
+#include "machine/team.h"
 
 namespace rasterbench {
 namespace {
 
 using Word = std::uint64_t;
 constexpr std::size_t kBlockBytes = kBlockWords * sizeof(Word);
-// Per thread and repetition: about a hundred times what starting the threads takes.
+// Per thread and repetition: a tenth of a millisecond or more, against which the clock and the start do not
+// count.
 constexpr std::size_t kLeastBytes = std::size_t{4} << 20;
 // Where the system does not say how large the cache is: larger than those of most CPUs.
 constexpr std::size_t kAssumedCache = std::size_t{64} << 20;
@@ -36,14 +34,12 @@ class Part {
       : words_(words), blocks_(blocks), threads_(static_cast<std::size_t>(threads)) {}
 
   std::size_t blocks() const { return blocks_; }
-  Word* begin(std::int64_t thread) const { return words_ + first(thread) * kBlockWords; }
-  std::size_t blocks(std::int64_t thread) const { return first(thread + 1) - first(thread); }
-  std::size_t words(std::int64_t thread) const { return blocks(thread) * kBlockWords; }
+  Word* begin(int thread) const { return words_ + first(thread) * kBlockWords; }
+  std::size_t blocks(int thread) const { return first(thread + 1) - first(thread); }
+  std::size_t words(int thread) const { return blocks(thread) * kBlockWords; }
 
  private:
-  std::size_t first(std::int64_t thread) const {
-    return blocks_ * static_cast<std::size_t>(thread) / threads_;
-  }
+  std::size_t first(int thread) const { return blocks_ * static_cast<std::size_t>(thread) / threads_; }
 
   Word* words_;
   std::size_t blocks_, threads_;
@@ -52,30 +48,32 @@ class Part {
 class BandwidthBench {
  public:
   BandwidthBench(const WorkingSet& set, int threads)
-      : execution_(
-            make_execution({.backend = "openmp", .schedule = "static", .chunk = {}, .threads = threads})),
+      : team_(threads),
         read_blocks_(blocks_of(set.read_bytes, threads)),
         write_blocks_(blocks_of(set.write_bytes, threads)),
         memory_((read_blocks_ + write_blocks_) * kBlockWords, "the memory to measure bandwidth on"),
         read_(memory_.data(), read_blocks_, threads),
         write_(memory_.data() + read_blocks_ * kBlockWords, write_blocks_, threads) {
-    if (const int observed = observe_threads(*execution_).count; observed < threads)
-      throw Error(fmt::format("{} of {} threads ran", observed, threads));
     // With small pages the address translation would be measured, too: the bound is what the memory gives.
     huge_pages_ = madvise(memory_.data(), memory_.bytes(), MADV_HUGEPAGE) == 0;
-    seconds(1, [this](std::int64_t thread) {  // the first touch
+    team_.run([this](int thread) {  // the first touch
       store_words(read_.begin(thread), read_.words(thread), kPattern);
       store_words(write_.begin(thread), write_.words(thread), kPattern);
     });
   }
 
-  Bandwidth run(int repetitions, BandwidthLoops loops) {
+  Bandwidth run(const Repetitions& repetitions, BandwidthLoops loops) {
     const bool all = loops == BandwidthLoops::kAll;
     Bandwidth result;
-    result.threads = execution_->threads();
+    result.threads = team_.threads();
     result.set = {read_.blocks() * kBlockBytes, write_.blocks() * kBlockBytes};
     result.huge_pages = huge_pages_;
-    for (int repetition = -1; repetition < repetitions; ++repetition) {
+    const auto begin = std::chrono::steady_clock::now();
+    const auto is_early = [&] {
+      return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() <
+             repetitions.seconds;
+    };
+    for (int repetition = -1; repetition < repetitions.least || is_early(); ++repetition) {
       const double read = read_rate(), streaming = write_rate(stream_words);
       const double write = all ? write_rate(store_words) : 0, triads = all ? triad_rate() : 0;
       if (repetition < 0) continue;  // untimed: threads, pages and clocks are warm after it
@@ -89,42 +87,32 @@ class BandwidthBench {
   }
 
  private:
-  /// Seconds in which every thread runs `body`(thread) `passes` times.
-  template <class Body>
-  double seconds(int passes, Body body) {
-    const auto begin = std::chrono::steady_clock::now();
-    execution_->uniform_loop(execution_->threads(), [&](std::int64_t thread, int) {
-      for (int pass = 0; pass < passes; ++pass) body(thread);
-    });
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  }
-
   /// Bytes per second of `body`, which goes through `blocks` blocks on all threads together.
   template <class Body>
   double rate(std::size_t blocks, Body body) {
     const std::size_t bytes = blocks * kBlockBytes;
-    const auto threads = static_cast<std::size_t>(execution_->threads());
+    const auto threads = static_cast<std::size_t>(team_.threads());
     const auto passes = static_cast<int>(std::max<std::size_t>(1, kLeastBytes * threads / bytes));
-    return static_cast<double>(bytes) * passes / seconds(passes, body);
+    return static_cast<double>(bytes) * passes / team_.run([&](int thread) {
+      for (int pass = 0; pass < passes; ++pass) body(thread);
+    });
   }
 
   double read_rate() {
-    return rate(read_.blocks(),
-                [this](std::int64_t thread) { sum_words(read_.begin(thread), read_.words(thread)); });
+    return rate(read_.blocks(), [this](int thread) { sum_words(read_.begin(thread), read_.words(thread)); });
   }
 
   template <class Write>
   double write_rate(Write write) {
-    return rate(write_.blocks(), [this, write](std::int64_t thread) {
-      write(write_.begin(thread), write_.words(thread), kPattern);
-    });
+    return rate(write_.blocks(),
+                [this, write](int thread) { write(write_.begin(thread), write_.words(thread), kPattern); });
   }
 
   double triad_rate() {
     std::size_t blocks = 0;
     for (const Part* part : {&read_, &write_})
-      for (int thread = 0; thread < execution_->threads(); ++thread) blocks += part->blocks(thread) / 3 * 3;
-    return rate(blocks, [this](std::int64_t thread) {
+      for (int thread = 0; thread < team_.threads(); ++thread) blocks += part->blocks(thread) / 3 * 3;
+    return rate(blocks, [this](int thread) {
       for (const Part* part : {&read_, &write_}) {
         const std::size_t words = part->blocks(thread) / 3 * kBlockWords;
         // The first third is written and never read, so that no value grows from pass to pass.
@@ -134,7 +122,7 @@ class BandwidthBench {
     });
   }
 
-  std::unique_ptr<Execution> execution_;
+  Team team_;
   std::size_t read_blocks_, write_blocks_;
   Buffer<Word> memory_;
   Part read_, write_;
@@ -143,7 +131,8 @@ class BandwidthBench {
 
 }  // namespace
 
-Bandwidth measure_bandwidth(const WorkingSet& set, int threads, int repetitions, BandwidthLoops loops) {
+Bandwidth measure_bandwidth(const WorkingSet& set, int threads, const Repetitions& repetitions,
+                            BandwidthLoops loops) {
   return BandwidthBench(set, threads).run(repetitions, loops);
 }
 

@@ -23,12 +23,19 @@ struct Bandwidth {
   std::vector<double> read, write, streaming_write, triad;  ///< write and triad empty with kFloor
 };
 
-/// Measures on buffers of the set's sizes, dealt evenly to the threads of openmp:static, each of which is the
-/// first to touch its part. Repetitions take the loops in turn, after one untimed round; a small part is gone
-/// through several times per repetition, so that starting the threads does not count. The triad's arrays are
-/// thirds of each thread's parts of both buffers. Throws InputError where memory does not
-/// suffice, Error where fewer threads run than asked for.
-Bandwidth measure_bandwidth(const WorkingSet& set, int threads, int repetitions, BandwidthLoops loops);
+/// How often a measurement is repeated: until both are reached.
+struct Repetitions {
+  int least = 1;
+  double seconds = 0;  ///< of wall time; no repetition begins later
+};
+
+/// Measures on buffers of the set's sizes, dealt evenly to the threads of a Team, each of which is the first
+/// to touch its part. Repetitions take the loops in turn, after one untimed round; a small part is gone
+/// through several times per repetition. The triad's arrays are
+/// thirds of each thread's parts of both buffers. Throws InputError where memory does not suffice,
+/// Error where the threads cannot be had.
+Bandwidth measure_bandwidth(const WorkingSet& set, int threads, const Repetitions& repetitions,
+                            BandwidthLoops loops);
 
 /// Bytes of the outermost level of cache, all of its instances together; 0 where the system does not say.
 std::size_t last_level_cache_bytes();

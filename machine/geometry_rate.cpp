@@ -1,12 +1,9 @@
 #include "machine/geometry_rate.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <chrono>
 
 #include "base/error.h"
-#include "execution/execution.h"
+#include "machine/team.h"
 #include "pipeline/geometry.h"
 #include "pipeline/needs.h"
 #include "scene/camera.h"
@@ -14,7 +11,7 @@
 namespace rasterbench {
 namespace {
 
-// Per thread and repetition: about a millisecond, a hundred times what starting the threads takes.
+// Per thread and repetition: about a millisecond.
 constexpr std::int64_t kTrianglesPerRepetition = 65536;
 
 /// What one thread works on; aligned, so that no cache line belongs to two threads.
@@ -40,18 +37,14 @@ GeometryRate measure_geometry(const Scene& scene, int threads, int repetitions) 
   GeometryOptions options;
   options.needs = analyse_needs(scene.model.triangles, transform, options.near_rule).needs;
 
-  const auto execution =
-      make_execution({.backend = "openmp", .schedule = "static", .chunk = {}, .threads = threads});
-  if (const int observed = observe_threads(*execution).count; observed < threads)
-    throw Error(fmt::format("{} of {} threads ran", observed, threads));
+  Team team(threads);
   std::vector<Batch> batches(static_cast<std::size_t>(threads));
   const auto size = static_cast<std::int64_t>(chosen.size());
   const std::int64_t passes = std::max<std::int64_t>(1, kTrianglesPerRepetition / size);
 
   GeometryRate result{.threads = threads, .triangles = size, .ns_per_triangle = {}};
   for (int repetition = -1; repetition < repetitions; ++repetition) {
-    const auto begin = std::chrono::steady_clock::now();
-    execution->uniform_loop(threads, [&](std::int64_t thread, int) {
+    const double seconds = team.run([&](int thread) {
       Batch& batch = batches[static_cast<std::size_t>(thread)];
       if (batch.triangles.empty()) {  // in the untimed repetition: each thread touches its own memory first
         batch.triangles = chosen;
@@ -63,9 +56,8 @@ GeometryRate measure_geometry(const Scene& scene, int threads, int repetitions) 
                                    batch.counts);
       }
     });
-    const std::chrono::duration<double, std::nano> time = std::chrono::steady_clock::now() - begin;
     if (repetition >= 0)
-      result.ns_per_triangle.push_back(time.count() / static_cast<double>(passes * size * threads));
+      result.ns_per_triangle.push_back(1e9 * seconds / static_cast<double>(passes * size * threads));
   }
   return result;
 }

@@ -20,9 +20,8 @@ struct GeometryRate {
 };
 
 /// Times transform_triangles<float>, with the tests that `scene` needs, on kGeometryBatch triangles taken
-/// evenly from it (all, where it has fewer). Each thread of openmp:static goes through a copy of its own,
-/// again and again. Throws InputError for a scene without triangles, Error where fewer threads run than asked
-/// for.
+/// evenly from it (all, where it has fewer). Each thread of a Team goes through a copy of its own, again and
+/// again. Throws InputError for a scene without triangles, Error where the threads cannot be had.
 GeometryRate measure_geometry(const Scene& scene, int threads, int repetitions);
 
 }  // namespace rasterbench

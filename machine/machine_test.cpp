@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <numeric>
+#include <thread>
 #include <vector>
 
 #include "base/buffer.h"
@@ -11,12 +13,29 @@
 #include "machine/floor.h"
 #include "machine/geometry_rate.h"
 #include "machine/loops.h"
+#include "machine/team.h"
 #include "scene/scene.h"
 
 namespace rasterbench {
 namespace {
 
 constexpr std::size_t kBlockBytes = kBlockWords * sizeof(std::uint64_t);
+
+TEST(Team, EveryThreadRunsEveryWorkOnce) {
+  Team team(std::min(3, available_cpus()));
+  std::vector<int> runs(static_cast<std::size_t>(team.threads()));
+  for (int round = 1; round <= 50; ++round) {
+    EXPECT_GE(team.run([&](int thread) { ++runs[static_cast<std::size_t>(thread)]; }), 0);
+    for (const int count : runs) ASSERT_EQ(count, round);
+  }
+}
+
+TEST(Team, TimesTheSlowest) {
+  Team team(1);
+  EXPECT_GE(team.run([](int) { std::this_thread::sleep_for(std::chrono::milliseconds(5)); }), 0.005);
+}
+
+TEST(Team, RefusesThreadsThatCannotRunAtOnce) { EXPECT_THROW(Team(available_cpus() + 1), Error); }
 
 // The loops do what they are timed for: a loop that leaves something out would show a rate that nobody
 // reaches.
@@ -75,17 +94,27 @@ void expect_rates(const std::vector<double>& rates, std::size_t count) {
 
 TEST(MeasuredBandwidth, HasEveryRateForEachRepetition) {
   for (int threads = 1; threads <= std::min(2, available_cpus()); ++threads) {
-    const Bandwidth all = measure_bandwidth({100000, 200000}, threads, 3, BandwidthLoops::kAll);
+    const Bandwidth all = measure_bandwidth({100000, 200000}, threads, {3, 0}, BandwidthLoops::kAll);
     EXPECT_EQ(all.threads, threads);
     for (const auto& rates : {all.read, all.write, all.streaming_write, all.triad}) expect_rates(rates, 3);
-    const Bandwidth some = measure_bandwidth({100000, 200000}, threads, 2, BandwidthLoops::kFloor);
+    const Bandwidth some = measure_bandwidth({100000, 200000}, threads, {2, 0}, BandwidthLoops::kFloor);
     for (const auto& rates : {some.read, some.streaming_write}) expect_rates(rates, 2);
     EXPECT_TRUE(some.write.empty() && some.triad.empty());
   }
 }
 
+TEST(MeasuredBandwidth, RepeatsUntilItsTimeIsOver) {
+  const auto begin = std::chrono::steady_clock::now();
+  const Bandwidth measured = measure_bandwidth({1000, 1000}, 1, {2, 0.02}, BandwidthLoops::kFloor);
+  EXPECT_GE(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(20));
+  EXPECT_GE(measured.read.size(), 2u);
+  EXPECT_EQ(measured.read.size(), measured.streaming_write.size());
+}
+
 TEST(MeasuredBandwidth, RoundsBytesUpToBlocks) {
-  const auto set_of = [](WorkingSet set) { return measure_bandwidth(set, 1, 1, BandwidthLoops::kFloor).set; };
+  const auto set_of = [](WorkingSet set) {
+    return measure_bandwidth(set, 1, {1, 0}, BandwidthLoops::kFloor).set;
+  };
   EXPECT_EQ(set_of({10 * kBlockBytes, 20 * kBlockBytes}), (WorkingSet{10 * kBlockBytes, 20 * kBlockBytes}));
   EXPECT_EQ(set_of({10 * kBlockBytes + 1, 20 * kBlockBytes - 1}),
             (WorkingSet{11 * kBlockBytes, 20 * kBlockBytes}));
@@ -93,7 +122,7 @@ TEST(MeasuredBandwidth, RoundsBytesUpToBlocks) {
 }
 
 TEST(MeasuredBandwidth, RefusesWhatDoesNotFit) {
-  EXPECT_THROW(measure_bandwidth({std::size_t{1} << 60, 8}, 1, 1, BandwidthLoops::kFloor), InputError);
+  EXPECT_THROW(measure_bandwidth({std::size_t{1} << 60, 8}, 1, {1, 0}, BandwidthLoops::kFloor), InputError);
 }
 
 TEST(BeyondCache, IsFourCachesOrAShareOfMemory) {
