@@ -23,6 +23,7 @@ void add_advise_command(CLI::App& app, Outcome& outcome);
 void add_extremes_command(CLI::App& app, Outcome& outcome);
 void add_fuzz_command(CLI::App& app, Outcome& outcome);
 void add_stability_command(CLI::App& app);
+void add_machine_command(CLI::App& app);
 void add_verify_command(CLI::App& app, Outcome& outcome);
 void add_runner_command(CLI::App& app, Outcome& outcome, const std::vector<std::string>& benchmark_flags);
 

@@ -12,6 +12,7 @@
 #include "harness/context.h"
 #include "harness/folder_lock.h"
 #include "harness/google_benchmark.h"
+#include "harness/limits.h"
 #include "harness/process.h"
 #include "harness/progress.h"
 #include "harness/run.h"
@@ -27,6 +28,8 @@ using Clock = std::chrono::steady_clock;
 
 constexpr double kVerifyTimeout = 3600;  // seconds: a specification of a huge picture takes its time
 constexpr double kSampleTimeout = 600;
+constexpr double kLimitsSeconds = 1;  // for the bandwidth of all points, unless a few repetitions take longer
+constexpr double kLongestLimitSeconds = 0.1;  // for that of one working set and thread count
 constexpr double kShortFrameMs =
     0.5;  // below it, so many frames make one sample that it is not all clock and start-up
 
@@ -46,6 +49,7 @@ class Coordinator {
         std::filesystem::exists(journal_path) ? read_journal(journal_path) : std::vector<Json>{};
     const bool resumed = !events.empty();
     if (resumed) replay(events, start, journal_path, states_);
+    limits_ = replay_limits(events, journal_path);
     for (const PointState& state : states_)  // the processes of a resumed study are new ones
       for (const Sample& sample : state.samples) next_launch_ = std::max(next_launch_, sample.launch + 1);
     journal_ = std::make_unique<Journal>(journal_path);
@@ -56,6 +60,8 @@ class Coordinator {
     Json context = describe_context(study_, study_options_, options_.custom_context);
     verify_points();
     describe_peers(context);
+    measure_limits();
+    context["limits"] = limits_.to_json();
     draw_images(context);
     sample_points();
     return finish(context);
@@ -163,6 +169,37 @@ class Coordinator {
         context["libraries"][state.planned->point.kernel] =
             fmt::format("{}; {}", state.judgement.at("verify").at("peer").at("renderer").get<std::string>(),
                         state.judgement.at("verify").at("peer").at("version").get<std::string>());
+  }
+
+  /// The bandwidth that the floors of the points follow from, in a process without bindings. What goes wrong
+  /// is said and costs the floors, not the points.
+  void measure_limits() {
+    const std::vector<LimitKey> missing = missing_limits(states_, study_, limits_);
+    // Other load comes and goes: the best of many repetitions is undisturbed where the best of a few is not.
+    const double seconds = std::min(
+        kLongestLimitSeconds, kLimitsSeconds / static_cast<double>(std::max<std::size_t>(missing.size(), 1)));
+    std::size_t done = 0;
+    for (const LimitKey& key : missing) {
+      const std::string what =
+          fmt::format("threads: {}, {:.2f} MB", key.threads,
+                      static_cast<double>(key.set.read_bytes + key.set.write_bytes) / 1e6);
+      progress_.show("bandwidth", static_cast<double>(done++), static_cast<double>(missing.size()), what);
+      try {
+        const Json rates = runner(verifiers_, Environment{})
+                               .ask({{"op", "limit"},
+                                     {"threads", key.threads},
+                                     {"read_bytes", key.set.read_bytes},
+                                     {"write_bytes", key.set.write_bytes},
+                                     {"seconds", seconds}},
+                                    kSampleTimeout);
+        limits_.add(rates);
+        journal_->append({{"event", "limit"}, {"rates", rates}});
+        if (rates.at("read").is_string())
+          progress_.note(fmt::format("no floor of {}: {}", what, rates.at("read").get<std::string>()));
+      } catch (const ProcessError& error) {
+        progress_.note(fmt::format("no floor of {}: {}", what, error.what()));
+      }
+    }
   }
 
   /// A picture of each scene for the report, by the first point of it that passed. A side matter: what goes
@@ -347,7 +384,7 @@ class Coordinator {
     std::string lines;
     std::vector<Json> records;
     for (const PointState& state : states_) {
-      records.push_back(make_record(state, study_, id));
+      records.push_back(make_record(state, study_, limits_.floor_of(limit_of(state, study_)), id));
       lines += dump(records.back()) + "\n";
     }
     try {
@@ -375,6 +412,7 @@ class Coordinator {
   Clock::time_point begin_;
   std::vector<PointState> states_;
   std::unique_ptr<Journal> journal_;
+  Limits limits_;
   std::map<Environment, std::unique_ptr<Process>> verifiers_;
   std::map<int, std::map<Environment, std::unique_ptr<Process>>> runners_;  // by slot
   Process* running_ = nullptr;

@@ -108,7 +108,8 @@ void apply_event(const Json& event, PointState& state) {
   }
 }
 
-Json make_record(const PointState& state, const Study& study, const std::string& context_id) {
+Json make_record(const PointState& state, const Study& study, std::optional<double> floor_ms,
+                 const std::string& context_id) {
   const Point& point = state.planned->point;
   Json record;
   record["schema"] = 1;
@@ -148,6 +149,7 @@ Json make_record(const PointState& state, const Study& study, const std::string&
   record["p95_ms"] = p95 ? Json(*p95) : Json();
   record["min_ms"] = ok ? Json(*std::min_element(times.begin(), times.end())) : Json();
   record["max_ms"] = ok ? Json(*std::max_element(times.begin(), times.end())) : Json();
+  record["floor_ms"] = ok && floor_ms ? Json(*floor_ms) : Json();
   record["stop"] = ok ? Json(state.stop.empty() ? "time_limit" : state.stop) : Json();
   record["verify"] = state.judgement.is_null() ? Json() : state.judgement.value("verify", Json());
   record["work"] = state.judgement.is_null() ? Json() : state.judgement.value("work", Json());

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -48,8 +49,9 @@ void replay(const std::vector<Json>& events, const Json& start, const std::files
 /// Applies one event to the state that it names; the same code for a running study and a replayed one.
 void apply_event(const Json& event, PointState& state);
 
-/// One line of records.jsonl.
-Json make_record(const PointState& state, const Study& study, const std::string& context_id);
+/// One line of records.jsonl. `floor_ms` is that of the point, if it has one.
+Json make_record(const PointState& state, const Study& study, std::optional<double> floor_ms,
+                 const std::string& context_id);
 
 /// A table for the terminal: name, median, interval, samples, or the reason why there is none.
 std::string summary_table(const std::vector<PointState>& states);

@@ -53,11 +53,12 @@ TEST_F(RunTest, RecordHoldsTheSamples) {
   apply_event(verify(), states_[0]);
   for (int i = 0; i < 7; ++i) apply_event(sample(i, 10 - i), states_[0]);
   apply_event({{"event", "stop"}, {"reason", "target"}}, states_[0]);
-  const Json record = make_record(states_[0], study_, "context");
+  const Json record = make_record(states_[0], study_, 1.5, "context");
   EXPECT_EQ(record.at("status"), "ok");
   EXPECT_EQ(record.at("samples_ms").size(), 7u);
   EXPECT_EQ(record.at("median_ms"), 7.0);
   EXPECT_EQ(record.at("interval_ms"), (Json{4.0, 10.0}));
+  EXPECT_EQ(record.at("floor_ms"), 1.5);
   EXPECT_EQ(record.at("stop"), "target");
   EXPECT_EQ(record.at("frames_per_sample"), 2);
   EXPECT_EQ(record.at("stages_ms").at("geometry").size(), 7u);
@@ -69,16 +70,17 @@ TEST_F(RunTest, FailureHidesTheSpeed) {
   apply_event(verify(), states_[0]);
   apply_event(sample(0, 1), states_[0]);
   apply_event({{"event", "fail"}, {"reason", "died"}}, states_[0]);
-  const Json record = make_record(states_[0], study_, "context");
+  const Json record = make_record(states_[0], study_, 1.5, "context");
   EXPECT_EQ(record.at("status"), "failed");
   EXPECT_EQ(record.at("reason"), "died");
   EXPECT_TRUE(record.at("samples_ms").empty());
   EXPECT_TRUE(record.at("median_ms").is_null());
+  EXPECT_TRUE(record.at("floor_ms").is_null());
   EXPECT_EQ(summary_table(states_).find("1.000"), std::string::npos);
 }
 
 TEST_F(RunTest, SkippedPointsSayWhy) {
-  const Json record = make_record(states_[1], study_, "context");
+  const Json record = make_record(states_[1], study_, 1.5, "context");
   EXPECT_EQ(record.at("status"), "skipped");
   EXPECT_EQ(record.at("reason"), "no reason");
 }
@@ -111,7 +113,8 @@ TEST_F(RunTest, IdDependsOnSceneAndBuild) {
 TEST_F(RunTest, GoogleBenchmarkReportHasEverySample) {
   apply_event(verify(), states_[0]);
   for (int i = 0; i < 3; ++i) apply_event(sample(i, i + 1), states_[0]);
-  const std::vector<Json> records{make_record(states_[0], study_, "c"), make_record(states_[1], study_, "c")};
+  const std::vector<Json> records{make_record(states_[0], study_, {}, "c"),
+                                  make_record(states_[1], study_, {}, "c")};
   const Json report = Json::parse(google_benchmark_report(records, "json", {}));
   const Json& runs = report.at("benchmarks");
   ASSERT_EQ(runs.size(), 7u);  // three samples, mean, median, stddev, one error

@@ -9,6 +9,7 @@
 #include <iostream>
 
 #include "base/error.h"
+#include "harness/limits.h"
 #include "harness/verdict_json.h"
 #include "harness/verify.h"
 #include "kernels/kernel.h"
@@ -48,6 +49,9 @@ class Runner {
  public:
   Json answer(const Json& request) {
     const std::string op = request.at("op");
+    if (op == "limit")
+      return measure_limit({request.at("threads"), {request.at("read_bytes"), request.at("write_bytes")}},
+                            request.at("seconds"));
     if (op == "peer") return unless_missing([] { return peer_json(llvmpipe_version()); });
     const Point point = point_from_json(request.at("point"));
     if (op == "verify" && is_peer(point))

@@ -14,6 +14,7 @@ namespace rasterbench {
 ///   {"op": "sample", "point": {...}, "name", "frames"} -> {"ms", "stages", "per_thread", "threads_observed",
 ///   "counters"}
 ///   {"op": "peer"}                                    -> {"renderer", "version"} of this process's llvmpipe
+///   {"op": "limit", "threads", "read_bytes", "write_bytes", "seconds"} -> measure_limit()
 ///   {"op": "image", "point": {...}, "path"}           -> {} after writing the picture
 /// What a peer cannot do on this machine is answered {"skip": reason}; a request that fails, {"error": text}.
 /// `benchmark_flags` go to Google Benchmark.

@@ -46,6 +46,11 @@ def planned_only(words: list[str]) -> list[list[str]]:
     return [words if "--dry-run" in words else [*words, "--dry-run"]]
 
 
+def machine_of_a_small_point(words: list[str]) -> list[list[str]]:
+    """One thread, a small point and few repetitions."""
+    return [[*words, "--threads", "1", "--triangles", "1000", "--size", "64x48", "--repetitions", "6"]]
+
+
 def report_of_a_small_study(words: list[str]) -> list[list[str]]:
     """The report is drawn of a study of seconds in the folder that the README names."""
     folder = next(word for word in words if word.startswith("results/"))
@@ -66,6 +71,7 @@ TABLE: list[tuple[str, Shorten]] = [
     (r"scripts/test( .*)?", syntax_only),
     (r"scripts/study( .*)?", study_of_the_script),
     (PRODUCT + r"rasterbench study .*", planned_only),
+    (PRODUCT + r"rasterbench machine( .*)?", machine_of_a_small_point),
     (PRODUCT + r"(rasterbench (render|list|scene|verify|advise|extremes|stability|fuzz|--help|--version)|graphics)\b.*", as_it_stands),
     (r"scripts/python -m analysis stability .*", as_it_stands),
     (r"scripts/python -m analysis report .*", report_of_a_small_study),

@@ -82,7 +82,7 @@ CONFIG = {"scene": TEXT, "scene_hash": TEXT, "size": LIST, "kernel": TEXT, "nume
           "tile": (WHOLE, NULL), "isa": TEXT, "output": TEXT, "cache": TEXT, "generality": TEXT}
 RECORD = {"schema": WHOLE, "id": TEXT, "name": TEXT, "config": dict, "status": TEXT, "launches": LIST, "blocks": LIST, "frames_per_sample": WHOLE,
           "samples_ms": LIST, "stages_ms": dict, "median_ms": (*NUMBER, NULL), "interval_ms": (LIST, NULL), "p95_ms": (*NUMBER, NULL),
-          "min_ms": (*NUMBER, NULL), "max_ms": (*NUMBER, NULL), "stop": (TEXT, NULL), "verify": (dict, NULL), "work": (dict, NULL),
+          "min_ms": (*NUMBER, NULL), "max_ms": (*NUMBER, NULL), "floor_ms": (*NUMBER, NULL), "stop": (TEXT, NULL), "verify": (dict, NULL), "work": (dict, NULL),
           "threads_observed": (WHOLE, NULL), "per_thread": LIST, "context": TEXT}
 VERIFY = {"conforms": bool, "checked_against": TEXT, "differing_pixels": WHOLE, "oracle": (dict, NULL), "end_to_end": dict, "embree": dict, "embree_robust": dict,
           "bound": dict}
@@ -99,7 +99,7 @@ WORK = {"triangles": WHOLE, "drawn": WHOLE, "pieces": WHOLE, "rejected": dict, "
         "fragments_tested": WHOLE, "fragments_covered": WHOLE, "covered_pixels": WHOLE, "bytes": WHOLE}
 REJECTED = dict.fromkeys(["non_finite", "zero_area", "behind_near", "beyond_far", "off_screen", "back_facing"], WHOLE)
 CONTEXT = {"schema": WHOLE, "id": TEXT, "started": TEXT, "finished": TEXT, "program": dict, "libraries": dict, "machine": dict,
-           "environment": dict, "study": dict, "region": TEXT, "scenes": dict, "overrides": dict, "custom": dict, "points": dict, "images": dict}
+           "environment": dict, "study": dict, "region": TEXT, "scenes": dict, "overrides": dict, "custom": dict, "points": dict, "images": dict, "limits": dict}
 MACHINE = {"hostname": TEXT, "cpu": TEXT, "cpus_online": WHOLE, "cpus_allowed": LIST, "cores": WHOLE, "packages": WHOLE, "numa_nodes": WHOLE,
            "smt": bool, "caches": LIST, "memory_bytes": WHOLE, "governor": TEXT, "load_average": TEXT, "kernel": TEXT, "virtualisation": TEXT}
 

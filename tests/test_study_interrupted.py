@@ -107,7 +107,7 @@ def test_interrupted_study_resumes_and_repeats_nothing(number: signal.Signals, f
         os.killpg(process.pid, number)  # a terminal signals the whole group
         outcome = ended(process)
     assert outcome.code not in (0, 2) and outcome.stdout == ""
-    (line,) = [line for line in outcome.errors if not line.startswith(("verifying: ", "sampling: "))]
+    (line,) = [line for line in outcome.errors if not line.startswith(("verifying: ", "bandwidth: ", "sampling: "))]
     assert line.startswith("rasterbench: ") and "interrupted" in line and "--resume" in line and "out/journal.jsonl" in line
     assert runners and not any(map(alive, runners))
     before = complete_lines(folder)
@@ -225,7 +225,7 @@ def test_full_disk_stops_the_study_and_spoils_nothing(small_disk: Path, folder: 
     (small_disk / "other.txt").write_text("precious")
     outcome = run("study", "s.toml", "--out", small_disk / "out", cwd=folder)
     assert outcome.code == 1 and outcome.stdout == ""
-    (line,) = [line for line in outcome.errors if not line.startswith(("verifying: ", "sampling: "))]
+    (line,) = [line for line in outcome.errors if not line.startswith(("verifying: ", "bandwidth: ", "sampling: "))]
     assert "journal.jsonl" in line and "No space left" in line and "--resume" in line
     assert (small_disk / "other.txt").read_text() == "precious"
     assert not (small_disk / "out/records.jsonl").exists() and not (small_disk / "out/context.json").exists()
@@ -268,4 +268,4 @@ def test_a_picture_that_cannot_be_written_fails_no_point(folder: Path) -> None:
 def test_the_journal_is_one_object_a_line(folder: Path) -> None:
     run("study", "s.toml", "--out", "out", "--filter", "scanline.*serial", cwd=folder).ok()
     kinds = [e["event"] for e in json_lines(folder / "out/journal.jsonl")]
-    assert kinds == ["start", "verify"] + ["sample"] * SAMPLES + ["stop"]
+    assert kinds == ["start", "verify", "limit"] + ["sample"] * SAMPLES + ["stop"]
