@@ -77,6 +77,7 @@ class Record:
     recorded_interval: tuple[float, float] | None
     context: str | None
     raw: dict[str, Any] = field(repr=False, default_factory=dict)
+    floor_ms: float | None = None  # absent in older records
 
     @property
     def ok(self) -> bool:
@@ -251,7 +252,13 @@ class _Reader:
         return Record(self.line, identity, name, config, status, reason, samples, stages, value.get("stop"), verify,
                       self.mapping("work"), observed if is_number(observed) else None, tuple(per_thread),
                       float(median) if is_number(median) else None, tuple(recorded) if recorded else None,
-                      value.get("context"), value)
+                      value.get("context"), value, self.floor())
+
+    def floor(self) -> float | None:
+        floor = self.value.get("floor_ms")
+        if floor is not None and not (is_number(floor) and floor > 0):
+            raise self.fail("floor_ms", f"expected a number above 0 or null, found {floor!r}")
+        return None if floor is None else float(floor)
 
     def mapping(self, key: str, required: bool = False) -> dict[str, Any]:
         if required and key not in self.value:

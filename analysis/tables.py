@@ -108,7 +108,9 @@ def points(analysis: Analysis, group: Group) -> Table:
     note = ("Intervals in brackets are 95 %. Base (a): " + (text.listing(bases) if bases else "none, no serial kernel was timed")
             + "; base (b): the same point on one thread, with its seconds."
             + (" A peer is another program, with an arithmetic and a fill rule of its own: it has no speedup and is no base."
-               if group.peers else ""))
+               if group.peers else "")
+            + (" x floor: times the time in which the point's bytes pass at the measured rate." if any(
+                r.floor_ms is not None for r in group.timed) else ""))
     return Table(f"points_{group.slug}", f"Strategy and execution, {group.title}", note,
                  pd.DataFrame(numbers).convert_dtypes(), pd.DataFrame(words).fillna(""), frozenset(marked))
 
@@ -146,18 +148,27 @@ def _measured(analysis: Analysis, record: Record, comparison: Comparison) -> dic
         speedup, label, seconds = _base(analysis, record, bases[record.id])
         row |= columns(f"speedup_{letter}", speedup) | {f"base_{letter}": label, f"base_{letter}_seconds": seconds}
         row[f"speedup_{letter}_kind"] = speedup.kind if speedup else None
+    if record.floor_ms is not None:
+        row |= {"floor_ms": record.floor_ms, "times_floor": _over_floor(analysis, record)}
     own = analysis.speedup(record, analysis.thread_base[record.id])
     row |= columns("efficiency", statistics.efficiency(own, record.config.threads) if own else None)
     return row
+
+
+def _over_floor(analysis: Analysis, record: Record) -> float | None:
+    """How many times the floor a point takes."""
+    return None if record.floor_ms is None else analysis.estimates[record.id].value / record.floor_ms
 
 
 def _said(analysis: Analysis, record: Record, comparison: Comparison) -> dict[str, str]:
     own, _, seconds = _base(analysis, record, analysis.thread_base[record.id])
     over, _, _ = _base(analysis, record, analysis.serial_base[record.id])
     is_base = analysis.serial_base[record.id] is record
+    floor = _over_floor(analysis, record)
     return {
         "median ms [95 %]": times(analysis.estimates[record.id]), "n": str(record.samples.n), "stop": record.stop or text.MISSING,
         "verdict": f"conforms; {accuracy(record)}",
+        **({"x floor": text.number(floor)} if floor is not None else {}),
         "time / fastest": "fastest" if comparison.verdict == "best"
         else times(comparison.ratio) + ("" if comparison.verdict == "slower" else " ≈"),
         "speedup (a)": "is base (a)" if is_base else times(over),
@@ -300,7 +311,7 @@ def plain(analysis: Analysis) -> str:
     parts = []
     for group in analysis.groups:
         words = points(analysis, group).words
-        keep = [c for c in ("kernel", "execution", "threads", "median ms [95 %]", "n", "stop", "time / fastest") if c in words]
+        keep = [c for c in ("kernel", "execution", "threads", "median ms [95 %]", "n", "stop", "time / fastest", "x floor") if c in words]
         columns = {c: [c, *map(str, words[c])] for c in keep}
         # A reason is longer than a time; it may reach over the columns that it leaves empty.
         width = {c: max(len(v) for v in cells if ": " not in v) for c, cells in columns.items()}

@@ -13,6 +13,7 @@ from .. import style, text
 from ..captions import Caption
 from ..comparison import Analysis, Group, strategy
 from ..load import Record
+from . import floors
 
 ROW_HEIGHT = 0.175  # inches
 MAX_ROWS = 44  # more rows go to a further figure
@@ -137,14 +138,19 @@ def row_frame(blocks: list[Block], title: str, unit: str, *, limits: tuple[float
 
 
 def dots(blocks: list[Block], series: list[str], title: str, unit: str, *, limits: tuple[float, float], log: bool,
-         ring: str = "", reference: float | None = None, reference_name: str = "") -> Figure:
-    """Horizontal dot plot with intervals."""
+         ring: str = "", reference: float | None = None, reference_name: str = "", floor: dict[int, float] | None = None) -> Figure:
+    """Horizontal dot plot with intervals; floor: where the line of a series stands."""
     keys = _keys(series, ring, reference, reference_name)
+    if floor:
+        limits, floor, far = floors.reached(limits, log, floor)
+        keys.append(floors.key(far))
     frame = row_frame(blocks, title, unit, limits=limits, log=log, keys=keys)
     for y, row in frame.rows:
         _points(frame.axes, row, y, len(series))
     if reference is not None:
         frame.axes.axvline(reference, color="black", lw=0.8, ls=(0, (4, 2)), zorder=1)
+    for index, at in (floor or {}).items():
+        floors.across(frame.axes, at, style.look(index).colour)
     return frame.figure
 
 

@@ -8,8 +8,9 @@ from .. import captions
 from ..comparison import Analysis, Group
 from ..load import Record
 from ..tables import accuracy
+from . import floors
 from .common import Block, Drawing, Row, bounds, dots, drawn_together, families, named, pages, part, peer_blocks, spread
-from .times import point, thread_series
+from .times import floor_lines, point, thread_series
 
 SECTION = "Numeric modes"
 
@@ -49,10 +50,11 @@ def _draw(analysis: Analysis, groups: list[Group]) -> Iterator[Drawing]:
     place = f"{config.scene} {config.size[0]}x{config.size[1]}"
     for page, chosen in enumerate(split):
         figure = dots(chosen, [f"{n} thread{'s' if n > 1 else ''}" for n in threads], place + part(page, len(split)),
-                      "time of a frame, median (ms)" + (", log scale" if log else ""), limits=bounds(every), log=log)
+                      "time of a frame, median (ms)" + (", log scale" if log else ""), limits=bounds(every), log=log,
+                      floor=floor_lines(records, threads))
         caption = captions.build(
             analysis, f"Time by numeric mode, {place}{part(page, len(split))}",
             "Within a band only the arithmetic differs: the distance between rows is its price.", records,
             notes=["At the right: the verdict against the oracle. Kernels that were timed in one mode only are in the figures of"
-                   " that mode."])
+                   " that mode.", *floors.notes(records)])
         yield Drawing(named(f"numerics_{groups[0].family_slug}", page, len(split)), SECTION, figure, caption)

@@ -12,6 +12,7 @@ from .. import captions, statistics, style, text
 from ..comparison import Analysis, Group
 from ..load import Record
 from ..statistics import Estimate
+from . import floors
 from .common import Block, Drawing, Row, drawn_together, bounds, dots, execution_rows, named, pages, part, spread
 from .times import point, thread_series
 
@@ -59,21 +60,27 @@ def _summary(analysis: Analysis, group: Group, best: dict[str, tuple[str, list[R
     panels = ["speedup over the same\non 1 thread, base (b)", "efficiency:\nspeedup (b) / threads"]
     if any(serial.values()):
         panels.append("speedup over the fastest\nserial kernel, base (a)")
-    foot = 0.55 + 0.17 * len(best)
+    shown = [r for _, records in best.values() for r in records]
+    floor = floors.by_threads(shown)
+    foot = 0.55 + 0.17 * (len(best) + bool(floor))
     height = 2.45 + foot + 0.58
     figure = style.new_figure(style.FULL_WIDTH, height)
     wide = (style.FULL_WIDTH - 0.1) / len(panels)
     axes = [style.place(figure, 0.58 + i * wide, foot, wide - 0.68, 2.45) for i in range(len(panels))]
     keys = []
+    limits: list[list[dict[int, float]]] = [[] for _ in panels]
     for i, (kernel, (execution, records)) in enumerate(best.items()):
         base = analysis.thread_base[records[-1].id]
         own = {r.config.threads: _self(analysis, r, base) for r in records}
         _curve(axes[0], own, i)
         _curve(axes[1], {p: statistics.efficiency(e, p) for p, e in own.items()}, i)
+        limits[0].append(floors.ceilings(floor, analysis.estimates[base.id].value, counts))
+        limits[1].append({p: ceiling / p for p, ceiling in limits[0][-1].items()})
         name = f"{kernel}, {execution}: base (b) {seconds(analysis, base)}"
         if serial[kernel] is not None:
             over = {r.config.threads: analysis.speedup(r, serial[kernel]) for r in records}
             _curve(axes[2], over, i)
+            limits[2].append(floors.ceilings(floor, analysis.estimates[serial[kernel].id].value, counts))
             name += f"; base (a) {serial[kernel].config.kernel}, {seconds(analysis, serial[kernel])}"
         look = style.look(i)
         keys.append(Line2D([], [], color=look.colour, marker=look.marker, ms=4, label=name))
@@ -88,17 +95,20 @@ def _summary(analysis: Analysis, group: Group, best: dict[str, tuple[str, list[R
         else:
             panel.axhline(1, color="black", lw=0.8, ls=(0, (4, 2)), zorder=1)
         panel.set_ylim(0, max(panel.get_ylim()[1], 1.1))
+        # Over base (a) all kernels share a line where they share the base; over their own bases each has one.
+        floors.over_threads(panel, limits[i], [style.look(k).colour if i < 2 else style.GREY for k in range(len(limits[i]))])
+    if floor:
+        keys.append(floors.key())
     style.title(figure, group.title)
     figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.05 / style.FULL_WIDTH, 0.03 / height), ncol=1,
                   borderaxespad=0.2)
-    shown = [r for _, records in best.values() for r in records]
     caption = captions.build(
         analysis, f"Speedup and efficiency over threads, {group.title}",
         "A line on the dashed one scales ideally; the distance below it is what is lost to overhead, imbalance and shared"
         " memory.", shown, estimates="medians of paired ratios", kind=ratio_kind(analysis, shown),
         base="Base (b) is the same kernel, backend and schedule on one thread; base (a) is the fastest serial kernel with"
              " equal picture, numeric mode and instruction set. Both are named with their seconds in the legend.",
-        notes=[f"Each kernel is drawn with the execution that has its lowest median at {counts[-1]} threads."])
+        notes=[f"Each kernel is drawn with the execution that has its lowest median at {counts[-1]} threads.", *floors.notes(shown)])
     return Drawing(f"scaling_{group.slug}", SECTION, figure, caption)
 
 
@@ -153,17 +163,18 @@ def _panels(analysis: Analysis, group: Group, every: dict[tuple[str, str], list[
     executions = list(dict.fromkeys(execution for _, execution in every))
     rows = -(-len(kernels) // COLUMNS)
     columns = style.legend_columns(executions)
-    foot = 0.3 + 0.17 * -(-len(executions) // columns)
+    shown = [r for records in every.values() for r in records]
+    floor = floors.by_threads(shown)
+    foot = 0.3 + 0.17 * (-(-len(executions) // columns) + bool(floor))
     each = min(1.85, (style.MAX_HEIGHT - foot - 0.35) / rows)
     height = rows * each + foot + 0.35
     figure = style.new_figure(style.FULL_WIDTH, height)
     wide = (style.FULL_WIDTH - 0.1) / COLUMNS
     top = 0.0
-    panels = []
+    panels: list[tuple[Axes, dict[int, float]]] = []
     for i, kernel in enumerate(kernels):
         row, column = divmod(i, COLUMNS)
         axes = style.place(figure, 0.5 + column * wide, height - 0.3 - (row + 1) * each + 0.4, wide - 0.6, each - 0.75)
-        panels.append(axes)
         lines = [(e, records) for (k, e), records in every.items() if k == kernel]
         bases = []
         for execution, records in lines:
@@ -173,25 +184,28 @@ def _panels(analysis: Analysis, group: Group, every: dict[tuple[str, str], list[
         axes.plot(counts, counts, color="black", lw=0.8, ls=(0, (4, 2)), zorder=1)
         _thread_axis(axes, counts)
         low, high = text.number(min(bases)), text.number(max(bases))
+        # One line a panel, of the fastest base: its executions differ little on one thread.
+        panels.append((axes, floors.ceilings(floor, 1000 * min(bases), counts)))
         axes.set_title(f"{kernel}\nbase (b) {low if low == high else f'{low} to {high}'} s", loc="left", fontsize=7.5,
                        linespacing=1.1, pad=4)
         axes.set_ylabel("speedup (times)" if column == 0 else "")
         if row < rows - 1 and i + COLUMNS < len(kernels):
             axes.set_xlabel("")
         top = max(top, axes.get_ylim()[1])
-    for axes in panels:
+    for axes, ceilings in panels:
         axes.set_ylim(0, top)
+        floors.over_threads(axes, [ceilings], [style.GREY])
     keys = [Line2D([], [], color=style.look(i).colour, marker=style.look(i).marker, ms=4, label=name)
-            for i, name in enumerate(executions)]
+            for i, name in enumerate(executions)] + ([floors.key()] if floor else [])
     style.title(figure, group.title)
     figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.05 / style.FULL_WIDTH, 0.03 / height), ncol=columns,
                   borderaxespad=0.2, columnspacing=1.2)
-    shown = [r for records in every.values() for r in records]
     caption = captions.build(
         analysis, f"Speedup over threads by execution, {group.title}",
         "One panel a kernel. Where its lines lie together, the schedule does not matter for it; dashed is ideal.",
         shown, estimates="medians of paired ratios", kind=ratio_kind(analysis, shown),
-        base="Base (b): the same kernel, backend and schedule on one thread; the title of a panel gives its seconds.")
+        base="Base (b): the same kernel, backend and schedule on one thread; the title of a panel gives its seconds.",
+        notes=floors.notes(shown))
     return Drawing(f"scaling_by_execution_{group.slug}", SECTION, figure, caption)
 
 
@@ -215,17 +229,21 @@ def _over_serial(analysis: Analysis, group: Group) -> Iterator[Drawing]:
             blocks.append(Block(kernel, rows))
     every = [p for block in blocks for row in block.rows for p in row.points]
     low, high = bounds(every)
+    # The fastest base of a thread count gives its lowest, and so its only certain line.
+    limits = floors.ceilings(floors.by_threads(based), min(analysis.estimates[b.id].value for b in bases), threads)
     log = spread([p.value for p in every])
     split = pages(blocks)
     named_bases = text.listing([f"{b.config.kernel} ({b.config.isa}) with {seconds(analysis, b)}" for b in bases])
     for page, chosen in enumerate(split):
         figure = dots(chosen, [f"{n} thread{'s' if n > 1 else ''}" for n in threads], group.title + part(page, len(split)),
                       "speedup over the fastest serial kernel (times)" + (", log scale" if log else ""),
-                      limits=(min(low, 1), max(high, 1)), log=log, reference=1.0, reference_name="as fast as the base")
+                      limits=(min(low, 1), max(high, 1)), log=log, reference=1.0, reference_name="as fast as the base",
+                      floor={threads.index(count): ceiling for count, ceiling in limits.items()})
         caption = captions.build(
             analysis, f"Speedup over the fastest serial kernel, {group.title}{part(page, len(split))}",
             "Right of the dashed line a point is faster than the best serial kernel.", based,
             estimates="medians of paired ratios", kind=ratio_kind(analysis, based),
             base=f"Base (a), the fastest serial kernel with equal picture, numeric mode and instruction set: {named_bases}.",
-            notes=[f"The study has one thread count ({threads[0]}), so there is no curve over threads and no efficiency."])
+            notes=[f"The study has one thread count ({threads[0]}), so there is no curve over threads and no efficiency.",
+                   *floors.notes(based)])
         yield Drawing(named(f"speedup_{group.slug}", page, len(split)), SECTION, figure, caption)

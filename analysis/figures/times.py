@@ -8,6 +8,7 @@ from .. import captions, text
 from ..comparison import Analysis, Group, strategy
 from ..load import Record
 from ..statistics import Estimate
+from . import floors
 from .common import Block, Drawing, Point, Row, bounds, dots, drawn_together, execution_rows, named, pages, part, peer_blocks, spread, untimed_rows
 
 SECTION = "Time per strategy"
@@ -48,12 +49,17 @@ def _draw(analysis: Analysis, group: Group) -> Iterator[Drawing]:
         # All pages of a scene share one axis, so that they can be laid side by side.
         figure = dots(chosen, [f"{n} thread{'s' if n > 1 else ''}" for n in threads], group.title + part(page, len(split)),
                       "time of a frame, median (ms)" + (", log scale" if log else ""), limits=bounds(every), log=log,
-                      ring="fastest, or not distinguishable from it")
+                      ring="fastest, or not distinguishable from it", floor=floor_lines(group.timed, threads))
         caption = captions.build(
             analysis, f"Time per strategy, {group.title}{part(page, len(split))}",
             "Left is faster. Where two intervals are apart the points differ; rings mark the fastest and what cannot be told"
             " apart from it.", shown, notes=_notes(analysis, group))
         yield Drawing(named(f"time_{group.slug}", page, len(split)), SECTION, figure, caption)
+
+
+def floor_lines(records: list[Record], threads: list[int]) -> dict[int, float]:
+    """Where the line of each series of thread_series() stands in a figure of times."""
+    return {threads.index(count): floor for count, floor in floors.by_threads(records).items()}
 
 
 def near_best(group: Group, record: Record) -> bool:
@@ -70,6 +76,7 @@ def _notes(analysis: Analysis, group: Group) -> list[str]:
     if group.peers:
         notes.append("A peer is another program that draws the same scene, with an arithmetic and a fill rule of its own: no kernel, and"
                      " no base of a speedup.")
+    notes += floors.notes(group.timed)
     if group.untimed:
         notes.append("Failed and skipped points are listed with their reasons and show no time.")
     return notes
