@@ -24,8 +24,8 @@ class Warn:
 
 def check(analysis: Analysis) -> list[Warn]:
     """The grave ones first."""
-    found = [warn for rule in (_launches, _samples, _stops, _provenance, _load, _bases, _pinning, _threads, _families,
-                               _agreement, _images) for warn in rule(analysis)]
+    found = [warn for rule in (_launches, _samples, _stops, _provenance, _load, _bases, _pinning, _threads, _floors,
+                               _families, _agreement, _images) for warn in rule(analysis)]
     return sorted(found, key=lambda warn: warn.severity != NOT_PUBLISHABLE)
 
 
@@ -147,6 +147,14 @@ def _threads(analysis: Analysis) -> Iterator[Warn]:
         over = [r for r in analysis.study.timed if r.config.threads > len(allowed)]
         if over:
             yield Warn(NOTE, f"more threads than the {text.count(len(allowed), 'allowed CPU')} in {_some(over, analysis)}.")
+
+
+def _floors(analysis: Analysis) -> Iterator[Warn]:
+    """A limit that is broken was measured wrongly, or is none: the floor assumes stores that go past the caches."""
+    below = [r for r in analysis.study.timed if r.floor_ms is not None and analysis.estimates[r.id].value < r.floor_ms]
+    if below:
+        yield Warn(NOTE, f"{_some(below, analysis)} took less time than the floor: other load disturbed its measurement, or the picture"
+                   " stays in the caches, which ordinary stores can fill faster than streaming stores reach memory.")
 
 
 def _families(analysis: Analysis) -> Iterator[Warn]:

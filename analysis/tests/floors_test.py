@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from .. import __main__ as program
-from .. import load, tables
+from .. import checks, load, tables
 from ..figures import draw, floors
 from .conftest import FEW, analyse
 
@@ -127,6 +127,13 @@ def test_table_of_old_records_has_no_column(study):
     analysis = analyse(study())
     table = tables.points(analysis, analysis.groups[0])
     assert "x floor" not in table.words and "floor_ms" not in table.numbers and "floor" not in table.note
+
+
+def test_times_below_the_floor_are_said(study):
+    def said(share):
+        return any("less time than the floor" in warn.text for warn in checks.check(analyse(study(edit=with_floors(share)))))
+
+    assert said(2.5) and not said(0.8)
 
 
 def test_reports_with_floors_are_whole(study, capsys):
