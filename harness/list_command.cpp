@@ -110,8 +110,7 @@ Json list_schedules() {
 Json list_isas() {
   Json list = Json::array();
   for (const Isa isa : all_isas())
-    list.push_back(
-        {{"name", to_string(isa)}, {"available", is_supported(isa)}, {"best", isa == best_isa()}});
+    list.push_back({{"name", to_string(isa)}, {"available", is_supported(isa)}, {"best", isa == best_isa()}});
   return list;
 }
 
@@ -180,8 +179,8 @@ void add_list_command(CLI::App& app) {
   const auto json = std::make_shared<bool>(false);
   static const std::map<std::string, Json (*)()> kLists{
       {"kernels", list_kernels},   {"peers", list_peers},         {"numerics", list_numerics},
-      {"backends", list_backends}, {"schedules", list_schedules}, {"isas", list_isas}, {"scenes", list_scenes},
-      {"studies", list_studies}};
+      {"backends", list_backends}, {"schedules", list_schedules}, {"isas", list_isas},
+      {"scenes", list_scenes},     {"studies", list_studies}};
   command->add_option("WHAT", *what, "kernels, peers, numerics, backends, schedules, isas, scenes or studies")
       ->required();
   command->add_flag("--json", *json, "an array of objects that have a \"name\"");

@@ -51,7 +51,7 @@ class Runner {
     const std::string op = request.at("op");
     if (op == "limit")
       return measure_limit({request.at("threads"), {request.at("read_bytes"), request.at("write_bytes")}},
-                            request.at("seconds"));
+                           request.at("seconds"));
     if (op == "peer") return unless_missing([] { return peer_json(llvmpipe_version()); });
     const Point point = point_from_json(request.at("point"));
     if (op == "verify" && is_peer(point))
