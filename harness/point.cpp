@@ -30,7 +30,8 @@ bool has_tiles(const Point& point) { return !is_peer(point) && find_kernel(point
 
 /// Whether the frame has loops that are compiled for each instruction set: those of the geometry stage.
 bool is_vectorised(const Point& point) {
-  return !is_peer(point) && find_mode(point.numeric)->has_screen_triangles;
+  const ModeInfo* mode = is_peer(point) ? nullptr : find_mode(point.numeric);
+  return mode != nullptr && mode->has_screen_triangles;
 }
 
 }  // namespace

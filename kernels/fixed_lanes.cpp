@@ -79,26 +79,29 @@ HWY_INLINE V clamped(V depth, V low, V high) {
   return hn::IfThenElse(hn::Lt(raised, high), raised, high);
 }
 
-/// Samples x0 <= x < x1 of row y, all inside.
+/// Samples x0 <= x < x1 of row y, all inside. The last vector of a span overlaps the one before it, which
+/// changes nothing: a key that was kept is kept again.
 HWY_INLINE void draw_span(const Fixed8::Prepared& t, std::int32_t y, std::int32_t x0, std::int32_t x1,
                           std::uint64_t* row) {
   const auto lanes = static_cast<std::int32_t>(hn::Lanes(kKeys));
+  if (x1 - x0 < lanes) {
+    for (std::int32_t x = x0; x < x1; ++x) keep_nearest(row[x], Fixed8::key(Fixed8::depth(t, x, y), t.rank));
+    return;
+  }
   const auto& plane = t.plane;
   const float of_row = plane.d0 + plane.gy * ((static_cast<float>(y) + 0.5f) - plane.y0);
   const auto at_row = hn::Set(kHalfFloats, of_row), gx = hn::Set(kHalfFloats, plane.gx);
   const auto low = hn::Set(kHalfFloats, plane.low), high = hn::Set(kHalfFloats, plane.high);
-  const auto corner = hn::Set(kHalfFloats, plane.x0);
+  const auto corner = hn::Set(kHalfFloats, plane.x0), half = hn::Set(kHalfFloats, 0.5f);
   const auto rank = hn::Set(kKeys, std::uint64_t{t.rank});
-  // Pixel numbers are small integers: these sums are exact.
-  auto sample = hn::Add(hn::Iota(kHalfFloats, static_cast<float>(x0)), hn::Set(kHalfFloats, 0.5f));
-  const auto next = hn::Set(kHalfFloats, static_cast<float>(lanes));
-  for (std::int32_t x = x0; x < x1; x += lanes, sample = hn::Add(sample, next)) {
+  for (std::int32_t next = x0; next < x1; next += lanes) {
+    const std::int32_t x = std::min(next, x1 - lanes);
+    // Pixel numbers are small integers: float32 holds them exactly.
+    const auto sample = hn::Add(hn::Iota(kHalfFloats, static_cast<float>(x)), half);
     const auto depth = clamped(hn::Add(at_row, hn::Mul(gx, hn::Sub(sample, corner))), low, high);
     const auto code = hn::PromoteTo(kKeys, encode(kHalfFloats, depth));
     const auto key = hn::Or(hn::ShiftLeft<32>(code), rank);
-    const auto mask = hn::FirstN(kKeys, static_cast<std::size_t>(std::min(x1 - x, lanes)));
-    const auto old = hn::MaskedLoad(mask, kKeys, row + x);
-    hn::BlendedStore(hn::Min(old, key), mask, kKeys, row + x);
+    hn::StoreU(hn::Min(hn::LoadU(kKeys, row + x), key), kKeys, row + x);
   }
 }
 
