@@ -29,7 +29,7 @@ struct LaneTriangles {
 /// One compilation of the loops.
 struct FixedLanes {
   /// Side in pixels of the largest box that `small` takes: edge values stay far within 32 bits.
-  static constexpr std::int32_t kMaxSmallSide = 8;
+  static constexpr std::int32_t kMaxSmallSide = 16;
 
   static bool is_small(const PixelBox& box) {
     return box.x1 - box.x0 <= kMaxSmallSide && box.y1 - box.y0 <= kMaxSmallSide;

@@ -39,31 +39,33 @@ struct TileSimd {
       execution.loop(lists_.cells(), [&](std::int64_t tile, int worker) {
         const PixelBox bounds = lists_.box(tile);
         const LaneTarget target{out.keys.data(), out.width};
-        Batch& tiny = small_[static_cast<std::size_t>(worker)].tiny;
-        Batch& little = small_[static_cast<std::size_t>(worker)].little;
-        for (const std::uint32_t index : lists_.entries(tile)) {
+        Batches& batches = small_[static_cast<std::size_t>(worker)];
+        const auto entries = lists_.entries(tile);
+        for (std::size_t entry = 0; entry < entries.size(); ++entry) {
+          if (entry + kAhead < entries.size()) {  // a tile's triangles may lie anywhere in memory
+            __builtin_prefetch(&boxes_[entries[entry + kAhead]]);
+            __builtin_prefetch(&in.triangles[entries[entry + kAhead]]);
+          }
+          const std::uint32_t index = entries[entry];
           const PixelBox& box = boxes_[index];
           if (!FixedLanes::is_small(box)) {
             const auto prepared = in.prepare(index);
             if (!prepared.box.empty()) lanes.large(prepared, intersect(prepared.box, bounds), target);
             continue;
           }
-          // Lanes wait for the largest box among them: boxes of a kind go together.
-          const bool is_tiny = box.x1 - box.x0 <= kTinySide && box.y1 - box.y0 <= kTinySide;
-          Batch& batch = is_tiny ? tiny : little;
+          Batch& batch = batches.of(box);
           batch.indices[batch.size++] = index;
           if (batch.size == kBatch) batch.draw(lanes, triangles, bounds, target);
         }
-        tiny.draw(lanes, triangles, bounds, target);
-        little.draw(lanes, triangles, bounds, target);
+        for (Batch& batch : batches.by_size) batch.draw(lanes, triangles, bounds, target);
       });
     }
 
     std::size_t bytes() const { return boxes_.bytes() + lists_.bytes() + small_.size() * sizeof(small_[0]); }
 
    private:
-    static constexpr std::int32_t kTinySide = 3;  // pixels
-    static constexpr std::size_t kBatch = 64;     // triangles: a few vectors of any width
+    static constexpr std::size_t kBatch = 64;  // triangles: a few vectors of any width
+    static constexpr std::size_t kAhead = 32;  // entries: about a memory latency's worth of work
 
     struct Batch {
       std::uint32_t indices[kBatch];
@@ -75,8 +77,18 @@ struct TileSimd {
         size = 0;
       }
     };
+    /// Lanes wait for the largest box among them: boxes of a kind go together, by their longer side in
+    /// pixels.
     struct alignas(64) Batches {
-      Batch tiny, little;
+      static constexpr std::int32_t kLongestSide[] = {2, 4, 8, FixedLanes::kMaxSmallSide};
+      Batch by_size[std::size(kLongestSide)];
+
+      Batch& of(const PixelBox& box) {
+        const std::int32_t side = std::max(box.x1 - box.x0, box.y1 - box.y0);
+        std::size_t i = 0;
+        while (side > kLongestSide[i]) ++i;
+        return by_size[i];
+      }
     };
 
     Buffer<PixelBox> boxes_;
