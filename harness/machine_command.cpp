@@ -106,7 +106,10 @@ Json measure_machine(const MachineOptions& options) {
     bandwidth.push_back(measure("beyond_cache", beyond));
     show("geometry", threads);
     const GeometryRate rate = measure_geometry(scene, threads, options.repetitions);
-    Json entry{{"threads", threads}, {"model", kGeometryModel}, {"batch_triangles", rate.triangles}};
+    Json entry{{"threads", threads},
+               {"model", kGeometryModel},
+               {"batch_triangles", rate.triangles},
+               {"isa", to_string(best_isa())}};
     entry.update(time_json("ns_per_triangle", rate.ns_per_triangle));
     geometry.push_back(entry);
     floors.push_back(floor_json(point, options.triangles, at_point, entry));
@@ -149,12 +152,13 @@ void print_machine(const Json& result) {
   fmt::print(
       "\n\npoint: {} triangles of {} bytes read, {} x {} pixels of {} bytes written\n"
       "floor: those bytes at the best read and streaming_write rates of the point\n"
-      "geometry: transform + reject of {} triangles in L1 cache ({}), wall time over those of all threads\n"
+      "geometry: transform + reject of {} triangles in L1 cache ({}; {}), wall time over those of all "
+      "threads\n"
       "{:>8}{:>12}{:>26}{:>20}\n",
       point.at("triangles").get<std::int64_t>(), kTriangleBytes, point.at("size").at(0).get<int>(),
       point.at("size").at(1).get<int>(), kPixelBytes,
-      result.at("geometry").at(0).at("batch_triangles").get<int>(), kGeometryModel, "threads", "floor ms",
-      "geometry ns/triangle", "geometry ms");
+      result.at("geometry").at(0).at("batch_triangles").get<int>(), kGeometryModel, to_string(best_isa()),
+      "threads", "floor ms", "geometry ns/triangle", "geometry ms");
   for (std::size_t i = 0; i < result.at("floor").size(); ++i) {
     const Json& floor = result.at("floor").at(i);
     fmt::print(

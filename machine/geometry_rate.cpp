@@ -34,7 +34,7 @@ GeometryRate measure_geometry(const Scene& scene, int threads, int repetitions) 
   const std::vector<Triangle> chosen = sampled(scene.model.triangles);
   if (chosen.empty()) throw InputError({.file = scene.model.name}, "has no triangles to measure geometry on");
   const ScreenTransform transform = make_screen_transform(make_camera(scene.parameters));
-  GeometryOptions options;
+  GeometryOptions options{.isa = best_isa()};
   options.needs = analyse_needs(scene.model.triangles, transform, options.near_rule).needs;
 
   Team team(threads);

@@ -38,7 +38,7 @@ def test_json_keys_and_types(machine: dict[str, Any]) -> None:
         assert isinstance(row["huge_pages"], bool)
         assert all(is_measured(row[loop], "gb_per_s") for loop in ("read", "write", "streaming_write", "triad"))
     for row in machine["geometry"]:
-        assert set(row) == {"threads", "model", "batch_triangles", "ns_per_triangle", "interval", "best"}
+        assert set(row) == {"threads", "model", "batch_triangles", "isa", "ns_per_triangle", "interval", "best"}
         assert is_measured({key: row[key] for key in ("ns_per_triangle", "interval", "best")}, "ns_per_triangle") and row["batch_triangles"] > 0
     assert [row["threads"] for row in machine["geometry"]] == [row["threads"] for row in machine["floor"]] == counts
 
