@@ -201,6 +201,7 @@ CaseJudge::CaseJudge(const Case& one, int threads) : one_(one) {
   for (const FillRule fill : one_.fills) {
     FrameSettings settings{.width = scene.parameters.width, .height = scene.parameters.height, .fill = fill};
     settings.geometry.near_rule = one_.near_rule;
+    settings.geometry.isa = best_isa();
     base_.push_back(std::make_unique<JudgedScene>(scene, settings, threads));
     if (one_.must.same_as)
       changed_.push_back(

@@ -97,7 +97,7 @@ Finding judge_change(const DrawnCase& drawn, const Picture& picture) {
 
 Finding judge_executions(const DrawnCase& drawn, const Picture& specification) {
   Finding finding;
-  const auto check = [&](RendererSetup setup, const std::string& how) {
+  const auto check = [&](RendererSetup setup, std::string_view how) {
     setup.scene = &drawn.base.scene;
     const auto renderer = make_renderer(drawn.kernel, drawn.mode.name, setup);
     for (int frame = 0; frame < 2; ++frame) renderer->draw();  // the second meets what the first left behind
@@ -120,6 +120,12 @@ Finding judge_executions(const DrawnCase& drawn, const Picture& specification) {
     RendererSetup setup = plain;
     setup.settings.tile = tile;
     check(setup, fmt::format("tiles of {} pixels", tile));
+  }
+  for (const Isa isa : all_isas()) {
+    if (!is_supported(isa)) continue;
+    RendererSetup setup = plain;
+    setup.settings.geometry.isa = isa;
+    check(setup, to_string(isa));
   }
   for (const Schedule& schedule : schedules()) {
     RendererSetup setup = plain;

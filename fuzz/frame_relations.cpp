@@ -46,6 +46,12 @@ ExecutionConfig any_execution(Random& random) {
   return execution;
 }
 
+/// One that this CPU has.
+Isa any_isa(Random& random) {
+  const Isa isa = all_isas()[random.bits() % all_isas().size()];
+  return is_supported(isa) ? isa : Isa::kBaseline;
+}
+
 Verdict kernel_relation(const FuzzCase& fuzz_case, const Subject& subject,
                         std::span<const std::string> kernels) {
   const Scene scene = scene_of(fuzz_case);
@@ -62,6 +68,7 @@ Verdict kernel_relation(const FuzzCase& fuzz_case, const Subject& subject,
     settings.tile = kTiles[random.bits() % std::size(kTiles)];
     const std::uint64_t choice = random.bits(), permutation = choice % 2 == 0 ? 0 : choice;
     settings.generality = random.bits() % 4 == 0 ? Generality::kFull : Generality::kMinimal;
+    settings.geometry.isa = any_isa(random);
     if (!find_kernel(kernel).variant(subject.info.name).make) continue;
     verdict = kHolds;
     const auto renderer =
@@ -71,10 +78,11 @@ Verdict kernel_relation(const FuzzCase& fuzz_case, const Subject& subject,
       renderer->draw();
       const std::string differs = difference(expected, picture_of(*renderer, settings), true);
       if (!differs.empty())
-        return judged(fmt::format("{}, {} on {} thread(s), tile {}, {}, frame {}: {}", kernel,
-                                  to_string(execution), execution.threads, settings.tile,
-                                  permutation ? "permuted" : "in order", frame, differs),
-                      true);
+        return judged(
+            fmt::format("{}, {} on {} thread(s), tile {}, {}, {}, frame {}: {}", kernel, to_string(execution),
+                        execution.threads, settings.tile, to_string(settings.geometry.isa),
+                        permutation ? "permuted" : "in order", frame, differs),
+            true);
     }
   }
   return verdict;
