@@ -1,4 +1,4 @@
-"""Command line: python3 -m analysis report DIR, table DIR, stability FILE."""
+"""Command line: python3 -m analysis report DIR, table DIR, speed DIR, stability FILE."""
 
 from __future__ import annotations
 
@@ -29,7 +29,11 @@ def parser() -> Parser:
     table = commands.add_parser("table", help="print the table of strategies and executions",
                                 description="Prints for each scene every point with its median time in milliseconds and the 95 %%"
                                             " interval.")
-    for command in (report, table):
+    speed = commands.add_parser("speed", help="print the kernel of a study beside the peer, the floor and their goals",
+                                description="Prints for each picture how many times faster than the peer the kernel is and how many times"
+                                            " the floor it takes, with 95 %% intervals, and whether that is the goal of its class"
+                                            " (studies/speed.toml). Writes DIR/speed.csv and DIR/speed.tex.")
+    for command in (report, table, speed):
         command.add_argument("directory", metavar="DIR", type=Path,
                              help="folder of a study, with context.json and records.jsonl (see harness/records.md)")
     stability = commands.add_parser("stability", help="draw the stability envelopes of numeric modes and list their breaking points",
@@ -59,6 +63,13 @@ def main(arguments: list[str] | None = None) -> int:
             from . import tables
 
             print(tables.plain(Analysis(study)))
+            return 0
+        if options.command == "speed":
+            from . import speed
+
+            analysis = Analysis(study)
+            print(speed.plain(analysis))
+            print(f"written: {', '.join(map(str, speed.write(analysis)))}")
             return 0
         from . import report
 

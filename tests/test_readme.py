@@ -42,6 +42,11 @@ def study_of_the_script(words: list[str]) -> list[list[str]]:
     return [*syntax_only(words), ["build/release/bin/rasterbench", "study", file, *options, "--dry-run"]]
 
 
+def speed_of_the_script(words: list[str]) -> list[list[str]]:
+    """The study that scripts/speed would run, planned only; test_speed.py runs the script itself on small scenes."""
+    return [*syntax_only(words), ["build/release/bin/rasterbench", "study", "studies/speed.toml", *words[1:], "--dry-run"]]
+
+
 def planned_only(words: list[str]) -> list[list[str]]:
     return [words if "--dry-run" in words else [*words, "--dry-run"]]
 
@@ -70,6 +75,7 @@ TABLE: list[tuple[str, Shorten]] = [
     (r"scripts/setup( .*)?", setup_only_checked),
     (r"scripts/test( .*)?", syntax_only),
     (r"scripts/study( .*)?", study_of_the_script),
+    (r"scripts/speed( .*)?", speed_of_the_script),
     (PRODUCT + r"rasterbench study .*", planned_only),
     (PRODUCT + r"rasterbench machine( .*)?", machine_of_a_small_point),
     (PRODUCT + r"(rasterbench (render|list|scene|verify|advise|extremes|stability|fuzz|--help|--version)|graphics)\b.*", as_it_stands),
@@ -206,7 +212,7 @@ def test_shortening() -> None:
     assert shortened("build/release/bin/rasterbench list kernels") == [[PRODUCT + "rasterbench", "list", "kernels"]]
 
 
-@pytest.mark.parametrize("script", ["setup", "study", "test", "python"])
+@pytest.mark.parametrize("script", ["setup", "study", "speed", "test", "python"])
 def test_scripts_parse(script: str) -> None:
     path = ROOT / "scripts" / script
     assert os.access(path, os.X_OK)
