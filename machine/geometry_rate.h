@@ -19,9 +19,10 @@ struct GeometryRate {
   std::vector<double> ns_per_triangle;  ///< wall time over the triangles of all threads, one a repetition
 };
 
-/// Times transform_triangles<float> on the best instruction set, with the tests that `scene` needs, on kGeometryBatch triangles taken
-/// evenly from it (all, where it has fewer). Each thread of a Team goes through a copy of its own, again and
-/// again. Throws InputError for a scene without triangles, Error where the threads cannot be had.
+/// Times transform_triangles<float> on the best instruction set, with the tests that `scene` needs, on
+/// kGeometryBatch triangles taken evenly from it (all, where it has fewer). Each thread of a Team goes
+/// through a copy of its own, again and again. Throws InputError for a scene without triangles, Error where
+/// the threads cannot be had.
 GeometryRate measure_geometry(const Scene& scene, int threads, int repetitions);
 
 }  // namespace rasterbench
