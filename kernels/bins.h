@@ -93,7 +93,7 @@ class CellLists {
   }
 
  private:
-  /// The cell of each pixel: looked up, because four divisions a box took longer than counting it.
+  /// The cell of each pixel, looked up in place of four divisions a box.
   static void fill_cell_of(std::vector<std::int32_t>& cells, int pixels, int pixels_of_cell) {
     cells.resize(static_cast<std::size_t>(pixels));
     for (int pixel = 0; pixel < pixels; ++pixel)

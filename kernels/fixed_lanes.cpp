@@ -47,13 +47,11 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 using Keys = hn::ScalableTag<std::uint64_t>;
 using HalfFloats = hn::Rebind<float, Keys>;  // as many as there are keys in a vector
-using HalfCodes = hn::Rebind<std::uint32_t, Keys>;
 using Floats = hn::ScalableTag<float>;
 using Integers = hn::ScalableTag<std::int32_t>;
 using Codes = hn::ScalableTag<std::uint32_t>;
 constexpr Keys kKeys;
 constexpr HalfFloats kHalfFloats;
-constexpr HalfCodes kHalfCodes;
 constexpr Floats kFloats;
 constexpr Integers kIntegers;
 constexpr Codes kCodes;

@@ -65,7 +65,7 @@ struct TileSimd {
 
    private:
     static constexpr std::size_t kBatch = 64;  // triangles: a few vectors of any width
-    static constexpr std::size_t kAhead = 32;  // entries: about a memory latency's worth of work
+    static constexpr std::size_t kAhead = 32;  // entries: how far triangles are fetched ahead
 
     struct Batch {
       std::uint32_t indices[kBatch];

@@ -11,8 +11,8 @@ namespace rasterbench {
 /// Triangles that one call takes at most: a bit of the answer for each.
 inline constexpr std::int64_t kMaxLaneTriangles = 64;
 
-/// transform_triangles() for triangles[0 .. n), n <= kMaxLaneTriangles, that are rejected or drawn as they
-/// are: their slots are written and they are counted. Bit i of the answer says that triangle i was left
+/// transform_triangles() for triangles[0 .. n), 0 < n <= kMaxLaneTriangles, that are rejected or drawn as
+/// they are: their slots are written and they are counted. Bit i of the answer says that triangle i was left
 /// untouched, because a plane cuts it or it has no lane. The arithmetic is that of corner.h, operation by
 /// operation, so that the result is the same to the bit. With Isa::kBaseline nothing is done.
 template <class Real>

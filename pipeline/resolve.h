@@ -54,8 +54,8 @@ void resolve_row(const typename Mode::Key* keys, int width, const Scene& scene, 
         runs.colours[runs.count] = background;
       } else {
         runs.ids[shaded] = swap_rank(tie, count, rank);
-        __builtin_prefetch(
-            &triangles[runs.ids[shaded]]);  // neighbours on the screen may lie far apart in memory
+        // Neighbours on the screen may lie far apart in memory.
+        __builtin_prefetch(&triangles[runs.ids[shaded]]);
         runs.run_of[shaded++] = runs.count;
       }
       runs.begin[runs.count++] = x;
