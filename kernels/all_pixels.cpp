@@ -38,6 +38,10 @@ struct AllPixels {
     }
 
     std::size_t bytes() const { return prepared_.bytes(); }
+    void count(WorkCounters& counters) const {
+      counters.raster_bytes->read += static_cast<std::int64_t>(prepared_.bytes());
+      counters.raster_bytes->written += static_cast<std::int64_t>(prepared_.bytes());
+    }
 
    private:
     Buffer<typename Mode::Prepared> prepared_;

@@ -77,6 +77,20 @@ class CellLists {
 
   std::int64_t cells() const { return std::int64_t{columns_} * rows_; }
 
+  /// The cells, their entries and their bytes, once listed and once gone through.
+  void count(WorkCounters& counters) const {
+    const auto entries = begin_.back();
+    counters.tiles = cells();
+    counters.tiles_touched = 0;
+    for (std::int64_t cell = 0; cell < cells(); ++cell)
+      *counters.tiles_touched += !this->entries(cell).empty();
+    counters.bin_entries = entries;
+    const auto moved = static_cast<std::int64_t>(cursors_.bytes() + begin_.size() * sizeof(begin_[0])) +
+                       entries * static_cast<std::int64_t>(sizeof(entries_[0]));
+    counters.raster_bytes->read += moved;
+    counters.raster_bytes->written += moved;
+  }
+
   /// Pixels of a cell, cut to the image.
   PixelBox box(std::int64_t cell) const {
     const auto column = static_cast<std::int32_t>(cell % columns_),
@@ -137,6 +151,11 @@ class Bins {
   }
 
   std::size_t bytes() const { return prepared_.bytes() + lists_.bytes(); }
+  void count(WorkCounters& counters) const {
+    lists_.count(counters);
+    counters.raster_bytes->read += static_cast<std::int64_t>(prepared_.bytes());
+    counters.raster_bytes->written += static_cast<std::int64_t>(prepared_.bytes());
+  }
   std::int64_t cells() const { return lists_.cells(); }
   /// Pixels of a cell, cut to the image.
   PixelBox box(std::int64_t cell) const { return lists_.box(cell); }

@@ -77,8 +77,9 @@ struct KernelRegistration {
         }
         variants.push_back({Mode::kInfo.name,
                             [](const RendererSetup& setup) -> std::unique_ptr<Renderer> {
-                              using Strategy = typename Definition::template Strategy<Mode>;
-                              return std::make_unique<FrameRenderer<Mode, Strategy>>(setup);
+                              if constexpr (is_counted<Mode>())
+                                if (setup.count) return make<Counted<Mode>>(setup);
+                              return make<Mode>(setup);
                             },
                             {}});
       } else {
@@ -87,6 +88,21 @@ struct KernelRegistration {
     });
     variants.push_back({kRayCastInfo.name, {}, "has no rays: ray_cast is a kernel of its own"});
     register_kernel(Kernel(Definition::kInfo, std::move(variants)));
+  }
+
+ private:
+  /// Whether counted frames of a mode count its calls; strategies with loops of their own have none to count.
+  template <NumericMode Mode>
+  static constexpr bool is_counted() {
+    if constexpr (CountableMode<Mode>) return requires {
+        typename Definition::template Strategy<Counted<Mode>>;
+      };
+    return false;
+  }
+
+  template <NumericMode Mode>
+  static std::unique_ptr<Renderer> make(const RendererSetup& setup) {
+    return std::make_unique<FrameRenderer<Mode, typename Definition::template Strategy<Mode>>>(setup);
   }
 };
 

@@ -31,6 +31,7 @@ struct RowParallel {
     }
 
     std::size_t bytes() const { return bins_.bytes(); }
+    void count(WorkCounters& counters) const { bins_.count(counters); }
 
    private:
     Bins<Mode> bins_;

@@ -100,6 +100,7 @@ struct Scanline {
     }
 
     std::size_t bytes() const { return bins_.bytes(); }
+    void count(WorkCounters& counters) const { bins_.count(counters); }
 
    private:
     static constexpr int kBandRows = 16;

@@ -32,6 +32,7 @@ struct TileParallel {
     }
 
     std::size_t bytes() const { return bins_.bytes(); }
+    void count(WorkCounters& counters) const { bins_.count(counters); }
 
    private:
     Bins<Mode> bins_;

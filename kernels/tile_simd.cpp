@@ -61,6 +61,12 @@ struct TileSimd {
       });
     }
 
+    void count(WorkCounters& counters) const {
+      lists_.count(counters);
+      counters.raster_bytes->read += static_cast<std::int64_t>(boxes_.bytes());
+      counters.raster_bytes->written += static_cast<std::int64_t>(boxes_.bytes());
+    }
+
     std::size_t bytes() const { return boxes_.bytes() + lists_.bytes() + small_.size() * sizeof(small_[0]); }
 
    private:

@@ -57,6 +57,15 @@ struct TrianglePrivate {
       return sum;
     }
 
+    void count(WorkCounters& counters) const {
+      std::int64_t keys = 0;
+      for (const Layer& layer : layers_) keys += layer.touched_keys();
+      counters.merges = keys;
+      const auto bytes = keys * static_cast<std::int64_t>(sizeof(Key));
+      counters.raster_bytes->read += bytes;
+      counters.raster_bytes->written += bytes;
+    }
+
    private:
     using Key = typename Mode::Key;
 
@@ -69,6 +78,11 @@ struct TrianglePrivate {
       std::size_t bytes() const { return keys_.bytes() + frame_of_.size() * sizeof(frame_of_[0]); }
       void next_frame() { ++frame_; }
       bool touched(std::size_t y) const { return frame_of_[y] == frame_; }
+      /// Keys of the rows that were touched in this frame.
+      std::int64_t touched_keys() const {
+        const auto rows = std::count(frame_of_.begin(), frame_of_.end(), frame_);
+        return rows * static_cast<std::int64_t>(keys_.size() / frame_of_.size());
+      }
       Key* row(std::size_t y, std::size_t width) {
         Key* row = keys_.data() + y * width;
         if (!touched(y)) {

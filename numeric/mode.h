@@ -175,9 +175,11 @@ concept RunMode = NumericMode<Mode> && requires(const typename Mode::Prepared& p
   { Mode::inside_run(prepared, 0, 0, 1) } -> std::same_as<std::uint64_t>;
 };
 
-/// The specification of coverage: the bounding box is part of it.
+/// The specification of coverage: the bounding box is part of it. A mode that counts has a covers() of its
+/// own.
 template <NumericMode Mode>
 bool covers(const typename Mode::Prepared& prepared, std::int32_t x, std::int32_t y) {
+  if constexpr (requires { Mode::covers(prepared, x, y); }) return Mode::covers(prepared, x, y);
   return prepared.box.contains(x, y) && Mode::inside(prepared, x, y);
 }
 

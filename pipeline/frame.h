@@ -16,6 +16,7 @@
 #include "base/buffer.h"
 #include "execution/execution.h"
 #include "numeric/mode.h"
+#include "pipeline/counters.h"
 #include "pipeline/geometry.h"
 #include "pipeline/needs.h"
 #include "scene/scene.h"
@@ -85,6 +86,7 @@ struct FrameReport {
   StageSeconds seconds;
   GeometryCounts counts;
   std::vector<WorkerTally> raster_tally;  ///< per worker, of the raster stage
+  WorkCounters counters;                  ///< of a renderer that counts; empty otherwise
 };
 
 /// Draws frames of one point: one scene, kernel, numeric mode and execution. Owns every buffer of the point
@@ -120,6 +122,8 @@ struct RendererSetup {
   /// Not 0: the screen triangles reach the kernel in a random order of this seed. For verification: the
   /// picture must not care.
   std::uint64_t permutation_seed = 0;
+  /// Fills FrameReport::counters. The picture is the same; the times are not those of a frame.
+  bool count = false;
 };
 
 /// The camera of `scene` for an image of the size in `settings`.

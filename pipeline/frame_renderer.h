@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstring>
 
+#include "pipeline/counted_mode.h"
 #include "pipeline/frame.h"
 #include "pipeline/resolve.h"
 #include "scene/generator.h"
@@ -83,6 +84,8 @@ class ScreenTriangles {
 /// Renderer for a staged strategy: `Strategy` has
 ///   void draw(const StagedTriangles<Mode>&, Visibility<Mode>, Execution&)
 ///   std::size_t bytes() const    memory of its own, if it has any
+///   void count(WorkCounters&) const    what it knows of its last frame, if anything: sets fields, adds to
+///                                      raster_bytes
 /// and may keep memory between frames; it is made afresh for every point.
 template <NumericMode Mode, class Strategy>
 class FrameRenderer final : public Renderer {
@@ -93,6 +96,7 @@ class FrameRenderer final : public Renderer {
         camera_(sized_camera(scene_, settings_)),
         depth_map_(depth_map(camera_, Mode::kDepthFunction)),
         permutation_seed_(setup.permutation_seed),
+        count_(setup.count),
         execution_(make_execution(setup.execution)),
         screen_(scene_.model.triangles.size()),
         keys_(settings_.pixels(), "the visibility buffer"),
@@ -121,8 +125,13 @@ class FrameRenderer final : public Renderer {
     if (permutation_seed_ != 0) screen_.shuffle(permutation_seed_);
     execution_->reset_tally();
     report_.seconds.raster = timed([&] {
-      strategy_.draw({screen_.span(), settings_, static_cast<std::int64_t>(scene_.model.triangles.size())},
-                     visibility, *execution_);
+      if constexpr (CountingMode<Mode>) {
+        CountingExecution counting(*execution_);
+        strategy_.draw(staged(), visibility, counting);
+        calls_ = counting.total();
+      } else {
+        strategy_.draw(staged(), visibility, *execution_);
+      }
     });
     report_.raster_tally.assign(execution_->tally().begin(), execution_->tally().end());
     report_.seconds.resolve = timed([&] {
@@ -132,6 +141,7 @@ class FrameRenderer final : public Renderer {
       });
     });
     report_.counts = screen_.counts();
+    if (count_) report_.counters = count_work();
     return report_;
   }
 
@@ -169,6 +179,64 @@ class FrameRenderer final : public Renderer {
     return settings;
   }
 
+  StagedTriangles<Mode> staged() const {
+    return {screen_.span(), settings_, static_cast<std::int64_t>(scene_.model.triangles.size())};
+  }
+
+  /// The last frame's counters, from what it left behind.
+  WorkCounters count_work() const {
+    WorkCounters counters;
+    if constexpr (CountingMode<Mode>) {
+      counters.fragments_tested = calls_.samples;
+      counters.edge_tests = calls_.edges;
+      counters.fragments_passed = calls_.keys;
+    }
+    count_boxes(counters);
+    count_visible(counters);
+    const auto bytes_of = [](std::int64_t n, std::size_t size) {
+      return n * static_cast<std::int64_t>(size);
+    };
+    const auto pixels = static_cast<std::int64_t>(settings_.pixels());
+    const auto slots = bytes_of(staged().size(), sizeof(screen_.span()[0]));
+    const auto covered_keys = bytes_of(*counters.covered_pixels, sizeof(typename Mode::Key));
+    counters.clear_bytes = {0, bytes_of(pixels, sizeof(typename Mode::Key))};
+    counters.geometry_bytes = {bytes_of(staged().triangle_count, sizeof(Triangle)), slots};
+    counters.raster_bytes = {slots + covered_keys, covered_keys};
+    counters.resolve_bytes = {bytes_of(pixels, sizeof(typename Mode::Key)) +
+                                  bytes_of(*counters.visible_triangles, sizeof(Triangle)),
+                              bytes_of(pixels, sizeof(std::uint32_t) + sizeof(float))};
+    if constexpr (requires { strategy_.count(counters); }) strategy_.count(counters);
+    return counters;
+  }
+
+  void count_boxes(WorkCounters& counters) const {
+    SizeClasses sizes;
+    std::int64_t samples = 0;
+    const StagedTriangles<Mode> triangles = staged();
+    for (std::int64_t i = 0; i < triangles.size(); ++i) {
+      if (triangles.triangles[static_cast<std::size_t>(i)].id < 0) continue;
+      const PixelBox box = triangles.prepare(i).box;
+      sizes.add(box.x1 - box.x0, box.y1 - box.y0);
+      if (!box.empty()) samples += std::int64_t{box.x1 - box.x0} * (box.y1 - box.y0);
+    }
+    counters.sizes = sizes;
+    counters.samples_in_boxes = samples;
+  }
+
+  void count_visible(WorkCounters& counters) const {
+    std::vector<bool> seen(scene_.model.triangles.size());
+    std::int64_t covered = 0, visible = 0;
+    for (std::size_t i = 0; i < settings_.pixels(); ++i) {
+      if (keys_[i] == Mode::kClear) continue;
+      ++covered;
+      auto&& is_known = seen[Mode::rank(keys_[i])];  // ranks are as many as triangles
+      visible += !is_known;
+      is_known = true;
+    }
+    counters.covered_pixels = covered;
+    counters.visible_triangles = visible;
+  }
+
   template <class Stage>
   static double timed(Stage stage) {
     const auto begin = std::chrono::steady_clock::now();
@@ -181,6 +249,8 @@ class FrameRenderer final : public Renderer {
   Camera camera_;
   DepthMap depth_map_;
   std::uint64_t permutation_seed_;
+  bool count_;
+  ModeCalls calls_;  // of the last counted frame
   std::unique_ptr<Execution> execution_;
   ScreenTriangles<typename Mode::Real> screen_;
   Buffer<typename Mode::Key> keys_;
