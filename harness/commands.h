@@ -19,6 +19,7 @@ void add_render_command(CLI::App& app);
 void add_study_command(CLI::App& app, Outcome& outcome, const std::vector<std::string>& benchmark_flags);
 void add_list_command(CLI::App& app);
 void add_scene_command(CLI::App& app);
+void add_explain_command(CLI::App& app);
 void add_advise_command(CLI::App& app, Outcome& outcome);
 void add_extremes_command(CLI::App& app, Outcome& outcome);
 void add_fuzz_command(CLI::App& app, Outcome& outcome);
@@ -47,6 +48,13 @@ struct DrawOptions {
 
 /// The execution that the options ask for; throws InputError.
 ExecutionConfig execution_of(const DrawOptions& options);
+
+/// What the options say of the frame; width and height are 0 where they leave the size to the scene. Throws
+/// InputError.
+FrameSettings frame_settings_of(const DrawOptions& options);
+
+/// Adds the options of DrawOptions that a point of a study has, too: all but tie and cull.
+void add_point_options(CLI::App& command, DrawOptions& options);
 
 /// Draws one picture and writes what is asked for; shared by `render` and `graphics`.
 struct Drawing {

@@ -34,6 +34,7 @@ int run(int argc, char** argv) {
   add_render_command(app);
   add_study_command(app, outcome, benchmark_flags);
   add_verify_command(app, outcome);
+  add_explain_command(app);
   add_list_command(app);
   add_scene_command(app);
   add_advise_command(app, outcome);

@@ -28,6 +28,23 @@ ExecutionConfig execution_of(const DrawOptions& options) {
   return execution;
 }
 
+FrameSettings frame_settings_of(const DrawOptions& options) {
+  FrameSettings settings;
+  settings.fill = parse_fill(options.fill, "--fill");
+  settings.geometry.near_rule = parse_near(options.near_rule, "--near");
+  check_word(options.tie, {"first", "last"}, "--tie");
+  settings.tie = options.tie == "first" ? TieRule::kFirst : TieRule::kLast;
+  check_word(options.cull, {"none", "back"}, "--cull");
+  settings.geometry.cull_back_faces = options.cull == "back";
+  settings.tile = options.tile;
+  settings.generality = parse_generality(options.generality, "--generality");
+  settings.geometry.isa = parse_isa(options.isa, "--isa");
+  if (!is_supported(settings.geometry.isa))
+    throw InputError({.field = "--isa"}, fmt::format("this CPU has no {}", options.isa));
+  if (!options.size.empty()) std::tie(settings.width, settings.height) = parse_size(options.size, "--size");
+  return settings;
+}
+
 namespace {
 
 void print_needs(const Scene& scene, const FrameSettings& settings, const ModeInfo& mode) {
@@ -47,19 +64,7 @@ void draw(const Drawing& drawing, const DrawOptions& options) {
   if (!drawing.image.empty()) check_image_path(drawing.image);
   for (const std::string& file : {drawing.image, drawing.ids, drawing.depth})
     if (!file.empty()) check_output_path(file);
-  FrameSettings settings;
-  settings.fill = parse_fill(options.fill, "--fill");
-  settings.geometry.near_rule = parse_near(options.near_rule, "--near");
-  check_word(options.tie, {"first", "last"}, "--tie");
-  settings.tie = options.tie == "first" ? TieRule::kFirst : TieRule::kLast;
-  check_word(options.cull, {"none", "back"}, "--cull");
-  settings.geometry.cull_back_faces = options.cull == "back";
-  settings.tile = options.tile;
-  settings.generality = parse_generality(options.generality, "--generality");
-  settings.geometry.isa = parse_isa(options.isa, "--isa");
-  if (!is_supported(settings.geometry.isa))
-    throw InputError({.field = "--isa"}, fmt::format("this CPU has no {}", options.isa));
-  if (!options.size.empty()) std::tie(settings.width, settings.height) = parse_size(options.size, "--size");
+  FrameSettings settings = frame_settings_of(options);
   find_kernel(options.kernel).variant(options.numeric);
   const ExecutionConfig execution = execution_of(options);
   find_schedule(execution);
@@ -109,7 +114,9 @@ std::string default_image(const std::string& model) {
   return name + ".png";
 }
 
-void add_draw_options(CLI::App& command, DrawOptions& o) {
+}  // namespace
+
+void add_point_options(CLI::App& command, DrawOptions& o) {
   command.add_option("--kernel", o.kernel, "strategy; see `rasterbench list kernels`")->capture_default_str();
   command.add_option("--numeric", o.numeric, "numeric mode; see `rasterbench list numerics`")
       ->capture_default_str();
@@ -126,9 +133,6 @@ void add_draw_options(CLI::App& command, DrawOptions& o) {
   command.add_option("--fill", o.fill, "closed (edges belong to both sides) or top-left (to one)")
       ->capture_default_str();
   command.add_option("--near", o.near_rule, "clip at the near plane, or off")->capture_default_str();
-  command.add_option("--tie", o.tie, "who wins an equal depth: first or last triangle")
-      ->capture_default_str();
-  command.add_option("--cull", o.cull, "none, or back: leave back faces out")->capture_default_str();
   command.add_option("--tile", o.tile, "side of a tile in pixels, for kernels that have tiles")
       ->capture_default_str()
       ->check(CLI::Range(1, 65536));
@@ -141,8 +145,6 @@ void add_draw_options(CLI::App& command, DrawOptions& o) {
                   "instruction set of the vectorised loops: baseline, sse4, avx2, avx512, or best")
       ->capture_default_str();
 }
-
-}  // namespace
 
 void add_render_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("render", "draw one picture and say how long it took");
@@ -161,7 +163,10 @@ void add_render_command(CLI::App& app) {
       ->check(CLI::Range(1, 1000000));
   command->add_flag("--explain", drawing->explain,
                     "say which tests the geometry stage leaves out for this scene, and why");
-  add_draw_options(*command, *options);
+  add_point_options(*command, *options);
+  command->add_option("--tie", options->tie, "who wins an equal depth: first or last triangle")
+      ->capture_default_str();
+  command->add_option("--cull", options->cull, "none, or back: leave back faces out")->capture_default_str();
   command->callback([drawing, options] {
     if (drawing->image.empty() && drawing->ids.empty() && drawing->depth.empty())
       drawing->image = default_image(drawing->model);

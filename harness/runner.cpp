@@ -9,6 +9,7 @@
 #include <iostream>
 
 #include "base/error.h"
+#include "harness/explain_point.h"
 #include "harness/limits.h"
 #include "harness/verdict_json.h"
 #include "harness/verify.h"
@@ -58,6 +59,7 @@ class Runner {
       return unless_missing([&] { return verifier_.judge(point, scene(point.scene)); });
     if (op == "verify") return verifier_.judge(point, scene(point.scene));
     if (op == "sample") return sample(point, request.at("name"), request.at("frames"));
+    if (op == "explain") return explain_point(point, scene(point.scene), request.at("samples"));
     if (op == "image") return image(point, request.at("path").get<std::string>());
     throw Error("unknown request " + op);
   }

@@ -15,6 +15,7 @@ namespace rasterbench {
 ///   "counters"}
 ///   {"op": "peer"}                                    -> {"renderer", "version"} of this process's llvmpipe
 ///   {"op": "limit", "threads", "read_bytes", "write_bytes", "seconds"} -> measure_limit()
+///   {"op": "explain", "point": {...}, "samples"}      -> explain_point()
 ///   {"op": "image", "point": {...}, "path"}           -> {} after writing the picture
 /// What a peer cannot do on this machine is answered {"skip": reason}; a request that fails, {"error": text}.
 /// `benchmark_flags` go to Google Benchmark.
