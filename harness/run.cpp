@@ -153,6 +153,7 @@ Json make_record(const PointState& state, const Study& study, std::optional<doub
   record["stop"] = ok ? Json(state.stop.empty() ? "time_limit" : state.stop) : Json();
   record["verify"] = state.judgement.is_null() ? Json() : state.judgement.value("verify", Json());
   record["work"] = state.judgement.is_null() ? Json() : state.judgement.value("work", Json());
+  record["hardware"] = state.judgement.is_null() ? Json() : state.judgement.value("hardware", Json());
   record["threads_observed"] =
       state.judgement.is_null() ? Json() : state.judgement.value("threads_observed", Json());
   record["per_thread"] = ok ? per_thread(state) : Json::array();

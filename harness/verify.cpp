@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "base/hash.h"
+#include "harness/counted_frames.h"
 #include "harness/study.h"
 #include "harness/verdict_json.h"
 #include "kernels/kernel.h"
@@ -96,7 +97,8 @@ Json Verifier::judge_peer(const Point& point, const Scene& scene) {
   answer["picture"] = picture_hash(*renderer);
   answer["work"] = {{"triangles", scene.model.triangles.size()},
                     {"covered_pixels", covered_pixels(picture)},
-                    {"bytes", renderer->bytes()}};
+                    {"bytes", renderer->bytes()},
+                    {"counted", nullptr}};
   const Json verdicts = judge_peer_picture(judge_of(point, scene), picture);
   Json& verify = answer["verify"];
   verify["conforms"] = nullptr;
@@ -132,6 +134,7 @@ Json Verifier::judge(const Point& point, const Scene& scene) {
       expect.specification);
   answer["frame_ms"] = drawn.report.seconds.total() * 1e3;
   answer["work"] = work_json(drawn.report.counts, expect.specification, drawn.bytes);
+  answer["work"]["counted"] = answer["hardware"] = nullptr;
   answer["picture"] = drawn.picture;
 
   Json& verify = answer["verify"];
@@ -144,6 +147,13 @@ Json Verifier::judge(const Point& point, const Scene& scene) {
                                     settings.pixels(), point.numeric);
   else if (answer["failure"].is_null())
     answer["failure"] = expect.verdicts.at("failure");
+  if (answer["failure"].is_null()) {
+    const CountedFrames counted = count_frames(point, scene);
+    answer["work"]["counted"] = work_counters_json(counted.report.counters);
+    answer["hardware"] = hardware_json(counted.hardware);
+    if (counted.picture != drawn.picture)
+      answer["failure"] = "the counted frame differs from the verified one";
+  }
   return answer;
 }
 

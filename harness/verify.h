@@ -31,11 +31,11 @@ Conformance check_conformance(const std::string& kernel, const std::string& mode
 /// Judges points. Keeps what the last ones were compared with: points are sorted by it.
 class Verifier {
  public:
-  /// {"verify": as in records.md, "work": as in records.md, "frame_ms": one frame, "threads_observed": n,
-  /// "failure": text or null}. Draws with the point's own kernel and execution: once as it is timed, once
-  /// with the screen triangles permuted. The verdicts on accuracy are those on the specification's picture,
-  /// which a point that conforms has drawn to the bit. A peer has no specification: its own picture is
-  /// judged. Throws InputError where a peer cannot draw the point on this machine.
+  /// {"verify": as in records.md, "work" and "hardware": as in records.md, "frame_ms": one frame,
+  /// "threads_observed": n, "failure": text or null}. Draws with the point's own kernel and execution: once
+  /// as it is timed, once with the screen triangles permuted. The verdicts on accuracy are those on the
+  /// specification's picture, which a point that conforms has drawn to the bit. A peer has no specification:
+  /// its own picture is judged. Throws InputError where a peer cannot draw the point on this machine.
   Json judge(const Point& point, const Scene& scene);
 
  private:

@@ -82,7 +82,7 @@ CONFIG = {"scene": TEXT, "scene_hash": TEXT, "size": LIST, "kernel": TEXT, "nume
           "tile": (WHOLE, NULL), "isa": TEXT, "output": TEXT, "cache": TEXT, "generality": TEXT}
 RECORD = {"schema": WHOLE, "id": TEXT, "name": TEXT, "config": dict, "status": TEXT, "launches": LIST, "blocks": LIST, "frames_per_sample": WHOLE,
           "samples_ms": LIST, "stages_ms": dict, "median_ms": (*NUMBER, NULL), "interval_ms": (LIST, NULL), "p95_ms": (*NUMBER, NULL),
-          "min_ms": (*NUMBER, NULL), "max_ms": (*NUMBER, NULL), "floor_ms": (*NUMBER, NULL), "stop": (TEXT, NULL), "verify": (dict, NULL), "work": (dict, NULL),
+          "min_ms": (*NUMBER, NULL), "max_ms": (*NUMBER, NULL), "floor_ms": (*NUMBER, NULL), "stop": (TEXT, NULL), "verify": (dict, NULL), "work": (dict, NULL), "hardware": (dict, NULL),
           "threads_observed": (WHOLE, NULL), "per_thread": LIST, "context": TEXT}
 VERIFY = {"conforms": bool, "checked_against": TEXT, "differing_pixels": WHOLE, "oracle": (dict, NULL), "end_to_end": dict, "embree": dict, "embree_robust": dict,
           "bound": dict}
@@ -96,7 +96,12 @@ EMBREE = {"version": TEXT, "first_error": (TEXT, NULL), "max_depth_difference": 
     ["identical", "edge_ties", "depth_ties", "errors"], WHOLE)
 BOUND = {"bounded": bool, "text": TEXT, "source": TEXT}
 WORK = {"triangles": WHOLE, "drawn": WHOLE, "pieces": WHOLE, "rejected": dict, "near_clipped": WHOLE, "guard_clipped": WHOLE,
-        "fragments_tested": WHOLE, "fragments_covered": WHOLE, "covered_pixels": WHOLE, "bytes": WHOLE}
+        "fragments_tested": WHOLE, "fragments_covered": WHOLE, "covered_pixels": WHOLE, "bytes": WHOLE, "counted": (dict, NULL)}
+COUNTED = {"sizes": (dict, NULL), "bytes": dict} | dict.fromkeys(
+    ["samples_in_boxes", "fragments_tested", "edge_tests", "fragments_passed", "covered_pixels", "visible_triangles", "tiles", "tiles_touched",
+     "bin_entries", "merges"], (WHOLE, NULL))
+EVENTS = ["cycles", "instructions", "branches", "branch_misses", "l1d_read_misses", "llc_misses", "dtlb_read_misses", "task_clock",
+          "context_switches", "page_faults"]
 REJECTED = dict.fromkeys(["non_finite", "zero_area", "behind_near", "beyond_far", "off_screen", "back_facing"], WHOLE)
 CONTEXT = {"schema": WHOLE, "id": TEXT, "started": TEXT, "finished": TEXT, "program": dict, "libraries": dict, "machine": dict,
            "environment": dict, "study": dict, "region": TEXT, "scenes": dict, "overrides": dict, "custom": dict, "points": dict, "images": dict, "limits": dict}
@@ -130,7 +135,39 @@ def test_records_have_the_documented_keys_and_types(study: Study) -> None:
             obey(r["verify"]["bound"], BOUND, r["name"])
             obey(r["work"], WORK, r["name"])
             obey(r["work"]["rejected"], REJECTED, r["name"])
+        if r["status"] == "ok":
+            obey(r["work"]["counted"], COUNTED, r["name"])
+            obey(r["hardware"], {"per_thread": LIST, "least_share": dict, "unavailable": dict}, r["name"])
     assert len({r["id"] for r in study.records}) == len({r["name"] for r in study.records}) == len(study.records)
+
+
+def test_counters_are_those_of_the_specification(study: Study) -> None:
+    counted = [r for r in study.records if r["status"] == "ok"]
+    for r in counted:
+        work, c = r["work"], r["work"]["counted"]
+        if r["config"]["kernel"] == "ray_cast":  # no screen triangles
+            assert c["sizes"] is None and c["fragments_tested"] is None
+            continue
+        assert sum(c["sizes"].values()) == work["pieces"]
+        assert c["samples_in_boxes"] == work["fragments_tested"] and c["covered_pixels"] == work["covered_pixels"]
+        if c["fragments_passed"] is not None:
+            assert c["fragments_passed"] == work["fragments_covered"]
+        assert (c["bin_entries"] is None) == (r["config"]["kernel"] not in ("row_parallel", "tile_parallel", "tile_simd", "scanline"))
+        assert (c["merges"] is None) == (r["config"]["kernel"] != "triangle_private")
+        assert c["bytes"]["geometry"]["read"] == 36 * work["triangles"]
+    assert any(r["work"]["counted"]["fragments_passed"] is not None for r in counted)
+
+
+def test_hardware_counters_are_there_or_say_why_not(study: Study) -> None:
+    assert any(r["status"] == "ok" for r in study.records)
+    for r in study.records:
+        if r["status"] == "ok":
+            hardware = r["hardware"]
+            assert sorted([*hardware["least_share"], *hardware["unavailable"]]) == sorted(EVENTS)
+            assert all(reason for reason in hardware["unavailable"].values())
+            for thread in hardware["per_thread"]:
+                assert list(thread) == EVENTS and any(thread.values())
+                assert {event for event, count in thread.items() if count is None} == set(hardware["unavailable"])
 
 
 def test_config_values(study: Study) -> None:
