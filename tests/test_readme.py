@@ -56,6 +56,11 @@ def machine_of_a_small_point(words: list[str]) -> list[list[str]]:
     return [[*words, "--threads", "1", "--triangles", "1000", "--size", "64x48", "--repetitions", "6"]]
 
 
+def explanation_of_a_small_picture(words: list[str]) -> list[list[str]]:
+    """A small picture and the fewest samples."""
+    return [[*words, "--size", "96x64", "--samples", "6"]]
+
+
 def report_of_a_small_study(words: list[str]) -> list[list[str]]:
     """The report is drawn of a study of seconds in the folder that the README names."""
     folder = next(word for word in words if word.startswith("results/"))
@@ -78,6 +83,7 @@ TABLE: list[tuple[str, Shorten]] = [
     (r"scripts/speed( .*)?", speed_of_the_script),
     (PRODUCT + r"rasterbench study .*", planned_only),
     (PRODUCT + r"rasterbench machine( .*)?", machine_of_a_small_point),
+    (PRODUCT + r"rasterbench explain .*", explanation_of_a_small_picture),
     (PRODUCT + r"(rasterbench (render|list|scene|verify|advise|extremes|stability|fuzz|--help|--version)|graphics)\b.*", as_it_stands),
     (r"scripts/python -m analysis stability .*", as_it_stands),
     (r"scripts/python -m analysis report .*", report_of_a_small_study),
