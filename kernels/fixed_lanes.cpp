@@ -12,6 +12,8 @@
 // After foreach_target.h:
 #include <hwy/highway.h>
 
+#include "kernels/fixed_lanes-inl.h"
+
 #ifndef RASTERBENCH_FIXED_LANES_ONCE
 #define RASTERBENCH_FIXED_LANES_ONCE
 namespace rasterbench {
@@ -43,39 +45,10 @@ namespace rasterbench {
 namespace HWY_NAMESPACE {
 namespace {
 
-namespace hn = hwy::HWY_NAMESPACE;
-
 using Keys = hn::ScalableTag<std::uint64_t>;
 using HalfFloats = hn::Rebind<float, Keys>;  // as many as there are keys in a vector
-using Floats = hn::ScalableTag<float>;
-using Integers = hn::ScalableTag<std::int32_t>;
-using Codes = hn::ScalableTag<std::uint32_t>;
 constexpr Keys kKeys;
 constexpr HalfFloats kHalfFloats;
-constexpr Floats kFloats;
-constexpr Integers kIntegers;
-constexpr Codes kCodes;
-constexpr std::size_t kLanes = hn::MaxLanes(kFloats);
-
-using Float = hn::Vec<Floats>;
-using Integer = hn::Vec<Integers>;
-
-/// encode() of numeric/mode.h.
-template <class D, class V>
-HWY_INLINE hn::Vec<hn::RebindToUnsigned<D>> encode(D d, V depth) {
-  const hn::RebindToUnsigned<D> du;
-  const hn::RebindToSigned<D> di;
-  const auto bits = hn::BitCast(du, hn::Add(depth, hn::Zero(d)));
-  const auto sign = hn::BitCast(du, hn::ShiftRight<31>(hn::BitCast(di, bits)));  // all ones where negative
-  return hn::Xor(bits, hn::Or(sign, hn::Set(du, 0x80000000u)));
-}
-
-/// The clamp of DepthPlane.
-template <class V>
-HWY_INLINE V clamped(V depth, V low, V high) {
-  const V raised = hn::IfThenElse(hn::Gt(depth, low), depth, low);
-  return hn::IfThenElse(hn::Lt(raised, high), raised, high);
-}
 
 /// Samples x0 <= x < x1 of row y, all inside. The last vector of a span overlaps the one before it, which
 /// changes nothing: a key that was kept is kept again.
@@ -109,19 +82,6 @@ void draw_large(const Fixed8::Prepared& triangle, const PixelBox& box, const Lan
     find_span(triangle, y, x0, x1);
     if (x0 < x1) draw_span(triangle, y, x0, x1, out.keys + y * out.width);
   }
-}
-
-/// A coordinate in 1/256 px, to the nearest, ties to even.
-HWY_INLINE Integer snapped(Float pixels) {
-  return hn::ConvertTo(kIntegers, hn::Round(hn::Mul(pixels, hn::Set(kFloats, 256.0f))));
-}
-
-/// The pixel of the first sample at or after a coordinate, and that behind the last one before or at it.
-HWY_INLINE Integer first_pixel(Integer grid) {
-  return hn::ShiftRight<8>(hn::Add(grid, hn::Set(kIntegers, 127)));
-}
-HWY_INLINE Integer end_pixel(Integer grid) {
-  return hn::Add(hn::ShiftRight<8>(hn::Sub(grid, hn::Set(kIntegers, 128))), hn::Set(kIntegers, 1));
 }
 
 /// Up to a vector of triangles, taken apart.
@@ -166,88 +126,6 @@ void find_boxes(const ScreenTriangle<float>* triangles, std::int64_t n, PixelBox
   }
 }
 
-/// A corner of each lane's triangle, snapped: in 1/256 px, in pixels, and its depth.
-struct LaneCorner {
-  Integer x, y;
-  Float px, py, d;
-};
-
-/// sort_corners() of numeric/mode.h.
-HWY_INLINE void sort_corners(LaneCorner& a, LaneCorner& b) {
-  const auto before = [](Integer u, Integer v, auto otherwise)
-                          HWY_ATTR { return hn::Or(hn::Lt(u, v), hn::And(hn::Eq(u, v), otherwise)); };
-  const auto depth_before = hn::RebindMask(kIntegers, hn::Le(a.d, b.d));
-  const auto ordered = before(a.x, b.x, before(a.y, b.y, depth_before));
-  const auto ordered_float = hn::RebindMask(kFloats, ordered);
-  const LaneCorner u = a, v = b;
-  a = {hn::IfThenElse(ordered, u.x, v.x), hn::IfThenElse(ordered, u.y, v.y),
-       hn::IfThenElse(ordered_float, u.px, v.px), hn::IfThenElse(ordered_float, u.py, v.py),
-       hn::IfThenElse(ordered_float, u.d, v.d)};
-  b = {hn::IfThenElse(ordered, v.x, u.x), hn::IfThenElse(ordered, v.y, u.y),
-       hn::IfThenElse(ordered_float, v.px, u.px), hn::IfThenElse(ordered_float, v.py, u.py),
-       hn::IfThenElse(ordered_float, v.d, u.d)};
-}
-
-/// Set-up of a vector of small triangles: edges as in FixedEdges, depth as in PlaneDepth<float, float>.
-struct SmallSetup {
-  Integer value[3];  ///< of each edge at the first sample of the box, less what counts as inside
-  Integer per_column[3], per_row[3];
-  Float d0, gx, gy, low, high, x0, y0;
-  hn::Mask<Integers> draws;
-};
-
-HWY_INLINE SmallSetup set_up(const Loaded& loaded, Integer box_x, Integer box_y, FillRule fill) {
-  LaneCorner c[3];
-  const auto pixel = hn::Set(kFloats, 1.0f / 256);
-  for (int i = 0; i < 3; ++i) {
-    c[i].x = snapped(hn::Load(kFloats, loaded.x[i]));
-    c[i].y = snapped(hn::Load(kFloats, loaded.y[i]));
-    c[i].px = hn::Mul(hn::ConvertTo(kFloats, c[i].x), pixel);  // exact: a power of two
-    c[i].py = hn::Mul(hn::ConvertTo(kFloats, c[i].y), pixel);
-    c[i].d = hn::Load(kFloats, loaded.d[i]);
-  }
-  sort_corners(c[0], c[1]);
-  sort_corners(c[1], c[2]);
-  sort_corners(c[0], c[1]);
-
-  SmallSetup s;
-  const auto zero = hn::Zero(kIntegers);
-  const auto area2 = hn::Sub(hn::Mul(hn::Sub(c[1].x, c[0].x), hn::Sub(c[2].y, c[0].y)),
-                             hn::Mul(hn::Sub(c[1].y, c[0].y), hn::Sub(c[2].x, c[0].x)));
-  s.draws = hn::Ne(area2, zero);
-  const auto half = hn::Set(kIntegers, 128);
-  const auto sample_x = hn::Add(hn::ShiftLeft<8>(box_x), half),
-             sample_y = hn::Add(hn::ShiftLeft<8>(box_y), half);
-  const auto is_negative = hn::Lt(area2, zero);
-  for (int e = 0; e < 3; ++e) {
-    const LaneCorner &from = c[kEdgeFrom[e]], &to = c[kEdgeTo[e]];
-    const auto flip = e == 2 ? hn::Not(is_negative) : is_negative;
-    const auto ex = hn::Sub(to.x, from.x), ey = hn::Sub(to.y, from.y);
-    const auto dx = hn::IfThenElse(flip, hn::Neg(ex), ex), dy = hn::IfThenElse(flip, hn::Neg(ey), ey);
-    auto value = hn::Sub(hn::Mul(dx, hn::Sub(sample_y, from.y)), hn::Mul(dy, hn::Sub(sample_x, from.x)));
-    if (fill == FillRule::kTopLeft) {
-      const auto owned = hn::Or(hn::Lt(dy, zero), hn::And(hn::Eq(dy, zero), hn::Gt(dx, zero)));
-      value = hn::Sub(value, hn::IfThenZeroElse(owned, hn::Set(kIntegers, 1)));
-    }
-    s.value[e] = value;
-    s.per_column[e] = hn::Neg(hn::ShiftLeft<8>(dy));
-    s.per_row[e] = hn::ShiftLeft<8>(dx);
-  }
-
-  const auto x1 = hn::Sub(c[1].px, c[0].px), y1 = hn::Sub(c[1].py, c[0].py);
-  const auto x2 = hn::Sub(c[2].px, c[0].px), y2 = hn::Sub(c[2].py, c[0].py);
-  const auto d1 = hn::Sub(c[1].d, c[0].d), d2 = hn::Sub(c[2].d, c[0].d);
-  const auto area = hn::Sub(hn::Mul(x1, y2), hn::Mul(y1, x2));
-  s.d0 = c[0].d;
-  s.gx = hn::Div(hn::Sub(hn::Mul(d1, y2), hn::Mul(d2, y1)), area);
-  s.gy = hn::Div(hn::Sub(hn::Mul(d2, x1), hn::Mul(d1, x2)), area);
-  s.low = hn::Min(hn::Min(c[0].d, c[1].d), c[2].d);
-  s.high = hn::Max(hn::Max(c[0].d, c[1].d), c[2].d);
-  s.x0 = c[0].px;
-  s.y0 = c[0].py;
-  return s;
-}
-
 /// The box of each lane: where it begins, its sides, and its first key.
 struct LaneBoxes {
   alignas(64) std::int32_t x[kLanes], y[kLanes], width[kLanes], height[kLanes];
@@ -259,13 +137,17 @@ struct LaneBoxes {
 HWY_INLINE void draw_vector(const Loaded& loaded, const LaneBoxes& boxes, FillRule fill,
                             const LaneTarget& out) {
   const Integer box_x = hn::Load(kIntegers, boxes.x), box_y = hn::Load(kIntegers, boxes.y);
-  SmallSetup s = set_up(loaded, box_x, box_y, fill);
+  LaneCorner corners[3];
+  for (int i = 0; i < 3; ++i)
+    corners[i] = {snapped(hn::Load(kFloats, loaded.x[i])), snapped(hn::Load(kFloats, loaded.y[i])),
+                  hn::Load(kFloats, loaded.d[i])};
+  sort_corners(corners);
+  SmallEdges s = small_edges(corners, box_x, box_y, fill);
+  const LanePlane plane = depth_plane(corners);
   const Integer width = hn::Load(kIntegers, boxes.width), height = hn::Load(kIntegers, boxes.height);
-  const auto half = hn::Set(kFloats, 0.5f);
   for (std::int32_t row = 0; row < boxes.highest; ++row) {
     const auto in_rows = hn::And(s.draws, hn::Gt(height, hn::Set(kIntegers, row)));
-    const auto sample_y = hn::Add(hn::ConvertTo(kFloats, hn::Add(box_y, hn::Set(kIntegers, row))), half);
-    const auto of_row = hn::Add(s.d0, hn::Mul(s.gy, hn::Sub(sample_y, s.y0)));
+    const auto of_row = depth_of_row(plane, sample_of(hn::Add(box_y, hn::Set(kIntegers, row))));
     Integer e0 = s.value[0], e1 = s.value[1], e2 = s.value[2];
     for (std::int32_t column = 0; column < boxes.widest; ++column) {
       const auto inside = hn::And(hn::And(in_rows, hn::Gt(width, hn::Set(kIntegers, column))),
@@ -277,8 +159,7 @@ HWY_INLINE void draw_vector(const Loaded& loaded, const LaneBoxes& boxes, FillRu
       hn::StoreMaskBits(kIntegers, inside, bytes);
       std::uint32_t bits = bytes[0] | std::uint32_t{bytes[1]} << 8;  // at most 16 lanes
       if (bits == 0) continue;
-      const auto sample_x = hn::Add(hn::ConvertTo(kFloats, hn::Add(box_x, hn::Set(kIntegers, column))), half);
-      const auto depth = clamped(hn::Add(of_row, hn::Mul(s.gx, hn::Sub(sample_x, s.x0))), s.low, s.high);
+      const auto depth = depth_at(plane, of_row, sample_of(hn::Add(box_x, hn::Set(kIntegers, column))));
       alignas(64) std::uint32_t codes[kLanes];
       hn::Store(encode(kFloats, depth), kCodes, codes);
       for (; bits != 0; bits &= bits - 1) {

@@ -228,16 +228,26 @@ GeometryCounts& GeometryCounts::operator+=(const GeometryCounts& other) {
   return *this;
 }
 
+namespace {
+
 template <class Real>
-void transform_triangles(std::span<const Triangle> triangles, std::int32_t first_id,
-                         const ScreenTransform& transform, const GeometryOptions& options,
-                         ScreenTriangle<Real>* slots, std::vector<ScreenTriangle<Real>>& extra,
-                         GeometryCounts& counts) {
+void set_slot(ScreenTriangle<Real>* slots, std::size_t i, const ScreenTriangle<Real>& triangle) {
+  slots[i] = triangle;
+}
+template <class Real>
+void set_slot(ScreenBatch<Real>* batch, std::size_t i, const ScreenTriangle<Real>& triangle) {
+  batch->set(i, triangle);
+}
+
+template <class Slots, class Real>
+void transform_into(std::span<const Triangle> triangles, std::int32_t first_id,
+                    const ScreenTransform& transform, const GeometryOptions& options, Slots* slots,
+                    std::vector<ScreenTriangle<Real>>& extra, GeometryCounts& counts) {
   counts.triangles += static_cast<std::int64_t>(triangles.size());
   Passage passage{transform, options, counts};
   const auto one_by_one = [&](std::size_t i) {
     if (!passage.run(triangles[i])) {
-      slots[i] = {{}, {}, {}, -1};
+      set_slot(slots, i, ScreenTriangle<Real>{{}, {}, {}, -1});
       return;
     }
     const std::int32_t id = first_id + static_cast<std::int32_t>(i);
@@ -250,16 +260,34 @@ void transform_triangles(std::span<const Triangle> triangles, std::int32_t first
                                      return a.x != b.x ? a.x < b.x : a.y < b.y;
                                    }),
                   polygon.end());
-    slots[i] = piece<Real>(p[0], p[1], p[2], id);
+    set_slot(slots, i, piece<Real>(p[0], p[1], p[2], id));
     for (std::size_t k = 3; k < polygon.size; ++k) extra.push_back(piece<Real>(p[0], p[k - 1], p[k], id));
   };
   for (std::size_t first = 0; first < triangles.size(); first += kMaxLaneTriangles) {
     const std::size_t n = std::min<std::size_t>(kMaxLaneTriangles, triangles.size() - first);
     std::uint64_t left = transform_in_lanes(triangles.data() + first, static_cast<std::int64_t>(n),
                                             first_id + static_cast<std::int32_t>(first), transform, options,
-                                            slots + first, counts);
+                                            slots, static_cast<std::int64_t>(first), counts);
     for (; left != 0; left &= left - 1) one_by_one(first + static_cast<std::size_t>(std::countr_zero(left)));
   }
+}
+
+}  // namespace
+
+template <class Real>
+void transform_triangles(std::span<const Triangle> triangles, std::int32_t first_id,
+                         const ScreenTransform& transform, const GeometryOptions& options,
+                         ScreenTriangle<Real>* slots, std::vector<ScreenTriangle<Real>>& extra,
+                         GeometryCounts& counts) {
+  transform_into(triangles, first_id, transform, options, slots, extra, counts);
+}
+
+void transform_triangles(std::span<const Triangle> triangles, std::int32_t first_id,
+                         const ScreenTransform& transform, const GeometryOptions& options,
+                         ScreenBatch<float>& batch, std::vector<ScreenTriangle<float>>& extra,
+                         GeometryCounts& counts) {
+  transform_into(triangles, first_id, transform, options, &batch, extra, counts);
+  std::fill(batch.ids + triangles.size(), std::end(batch.ids), -1);
 }
 
 template void transform_triangles(std::span<const Triangle>, std::int32_t, const ScreenTransform&,

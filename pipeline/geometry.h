@@ -8,6 +8,7 @@
 
 #include "base/isa.h"
 #include "numeric/screen.h"
+#include "pipeline/screen_batch.h"
 #include "scene/camera.h"
 #include "scene/model.h"
 
@@ -78,6 +79,12 @@ template <class Real>
 void transform_triangles(std::span<const Triangle> triangles, std::int32_t first_id,
                          const ScreenTransform& transform, const GeometryOptions& options,
                          ScreenTriangle<Real>* slots, std::vector<ScreenTriangle<Real>>& extra,
+                         GeometryCounts& counts);
+
+/// The same into one batch: at most ScreenBatch::kSize triangles; slots beyond them draw nothing.
+void transform_triangles(std::span<const Triangle> triangles, std::int32_t first_id,
+                         const ScreenTransform& transform, const GeometryOptions& options,
+                         ScreenBatch<float>& batch, std::vector<ScreenTriangle<float>>& extra,
                          GeometryCounts& counts);
 
 }  // namespace rasterbench

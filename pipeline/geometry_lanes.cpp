@@ -21,6 +21,7 @@ using Vector = hn::Vec<Doubles>;
 using Mask = hn::Mask<Doubles>;
 constexpr Doubles kDoubles;
 constexpr Floats kFloats;
+constexpr hn::Rebind<std::int32_t, Doubles> kIntegers;
 
 struct LanePoint {
   Vector x, y, z;
@@ -120,19 +121,53 @@ HWY_INLINE Mask all_of(const LaneCorner (&c)[3], Test test) {
 }
 
 /// Three coordinates of the lanes' corners, as they are stored: rounded once.
-HWY_INLINE void store_rounded(const Vector (&v)[3], float (&out)[3][hn::MaxLanes(kDoubles)]) {
-  for (int i = 0; i < 3; ++i) hn::StoreU(hn::DemoteTo(kFloats, v[i]), kFloats, out[i]);
+HWY_INLINE void store_rounded(Vector v, float* out) { hn::StoreU(hn::DemoteTo(kFloats, v), kFloats, out); }
+HWY_INLINE void store_rounded(Vector v, double* out) { hn::StoreU(v, kDoubles, out); }
+
+/// A vector of screen triangles.
+struct LaneScreen {
+  Vector x[3], y[3], d[3], ids;
+};
+
+/// Stores them one behind the other.
+template <class Real>
+HWY_INLINE void store_screen(const LaneScreen& v, ScreenTriangle<Real>* slots, std::int64_t first) {
+  constexpr std::size_t kLanes = hn::MaxLanes(kDoubles);
+  alignas(64) Real x[3][kLanes], y[3][kLanes], d[3][kLanes];
+  alignas(64) double ids[kLanes];
+  for (int i = 0; i < 3; ++i) {
+    store_rounded(v.x[i], x[i]);
+    store_rounded(v.y[i], y[i]);
+    store_rounded(v.d[i], d[i]);
+  }
+  hn::StoreU(v.ids, kDoubles, ids);
+  for (std::size_t lane = 0; lane < hn::Lanes(kDoubles); ++lane) {
+    ScreenTriangle<Real>& slot = slots[first + static_cast<std::int64_t>(lane)];
+    for (int i = 0; i < 3; ++i) {
+      slot.x[i] = x[i][lane];
+      slot.y[i] = y[i][lane];
+      slot.d[i] = d[i][lane];
+    }
+    slot.id = static_cast<std::int32_t>(ids[lane]);
+  }
 }
-HWY_INLINE void store_rounded(const Vector (&v)[3], double (&out)[3][hn::MaxLanes(kDoubles)]) {
-  for (int i = 0; i < 3; ++i) hn::StoreU(v[i], kDoubles, out[i]);
+
+/// Stores each coordinate in its array.
+template <class Real>
+HWY_INLINE void store_screen(const LaneScreen& v, ScreenBatch<Real>* batch, std::int64_t first) {
+  for (int i = 0; i < 3; ++i) {
+    store_rounded(v.x[i], batch->x[i] + first);
+    store_rounded(v.y[i], batch->y[i] + first);
+    store_rounded(v.d[i], batch->d[i] + first);
+  }
+  hn::StoreU(hn::DemoteTo(kIntegers, v.ids), kIntegers, batch->ids + first);
 }
 
 /// One vector of triangles; the steps are those of Passage in geometry.cpp, in its order.
-template <class Real>
+template <class Slots>
 HWY_INLINE std::uint64_t transform_vector(const Triangle* triangles, std::int32_t first_id,
                                           const ScreenTransform& t, const GeometryOptions& options,
-                                          ScreenTriangle<Real>* slots, GeometryCounts& counts) {
-  constexpr std::size_t kLanes = hn::MaxLanes(kDoubles);
+                                          Slots* slots, std::int64_t first_slot, GeometryCounts& counts) {
   const SceneNeeds& needs = options.needs;
   const LaneTriangles loaded = load_triangles(triangles);
   const LanePoint &a = loaded.corners[0], &b = loaded.corners[1], &c = loaded.corners[2];
@@ -165,7 +200,8 @@ HWY_INLINE std::uint64_t transform_vector(const Triangle* triangles, std::int32_
     }));
   }
 
-  Vector x[3], y[3], d[3];
+  LaneScreen screen;
+  auto &x = screen.x, &y = screen.y, &d = screen.d;
   if (lanes.any()) {
     for (int i = 0; i < 3; ++i) {
       x[i] = hn::Div(corners[i].x, corners[i].w);
@@ -196,51 +232,37 @@ HWY_INLINE std::uint64_t transform_vector(const Triangle* triangles, std::int32_
   counts.drawn += drawn;
   counts.pieces += drawn;
 
-  alignas(64) Real stored_x[3][kLanes], stored_y[3][kLanes], stored_d[3][kLanes];
-  alignas(64) double ids[kLanes];
-  store_rounded(x, stored_x);
-  store_rounded(y, stored_y);
-  store_rounded(d, stored_d);
   const auto lane_ids = hn::Add(hn::Set(kDoubles, first_id), hn::Iota(kDoubles, 0));
-  hn::StoreU(hn::IfThenElse(lanes.on_way(), lane_ids, hn::Set(kDoubles, -1)), kDoubles, ids);
-  for (std::size_t lane = 0; lane < hn::Lanes(kDoubles); ++lane) {
-    ScreenTriangle<Real>& slot = slots[lane];
-    for (int i = 0; i < 3; ++i) {
-      slot.x[i] = stored_x[i][lane];
-      slot.y[i] = stored_y[i][lane];
-      slot.d[i] = stored_d[i][lane];
-    }
-    slot.id = static_cast<std::int32_t>(ids[lane]);
-  }
+  screen.ids = hn::IfThenElse(lanes.on_way(), lane_ids, hn::Set(kDoubles, -1));
+  store_screen(screen, slots, first_slot);
   return lanes.left_bits();
 }
 
-template <class Real>
+template <class Slots>
 HWY_INLINE std::uint64_t transform_lanes(const Triangle* triangles, std::int64_t n, std::int32_t first_id,
                                          const ScreenTransform& t, const GeometryOptions& options,
-                                         ScreenTriangle<Real>* slots, GeometryCounts& counts) {
+                                         Slots* slots, std::int64_t first_slot, GeometryCounts& counts) {
   const auto lanes = static_cast<std::int64_t>(hn::Lanes(kDoubles));
   std::uint64_t left = 0;
   std::int64_t i = 0;
   for (; i + lanes <= n; i += lanes)
-    left |= transform_vector(triangles + i, first_id + static_cast<std::int32_t>(i), t, options, slots + i,
-                             counts)
+    left |= transform_vector(triangles + i, first_id + static_cast<std::int32_t>(i), t, options, slots,
+                             first_slot + i, counts)
             << i;
   for (; i < n; ++i) left |= std::uint64_t{1} << i;
   return left;
 }
 
-std::uint64_t transform_floats(const Triangle* triangles, std::int64_t n, std::int32_t first_id,
-                               const ScreenTransform& t, const GeometryOptions& options,
-                               ScreenTriangle<float>* slots, GeometryCounts& counts) {
-  return transform_lanes(triangles, n, first_id, t, options, slots, counts);
-}
-
-std::uint64_t transform_doubles(const Triangle* triangles, std::int64_t n, std::int32_t first_id,
-                                const ScreenTransform& t, const GeometryOptions& options,
-                                ScreenTriangle<double>* slots, GeometryCounts& counts) {
-  return transform_lanes(triangles, n, first_id, t, options, slots, counts);
-}
+#define RASTERBENCH_TRANSFORM(name, Slots)                                                   \
+  std::uint64_t name(const Triangle* triangles, std::int64_t n, std::int32_t first_id,       \
+                     const ScreenTransform& t, const GeometryOptions& options, Slots* slots, \
+                     std::int64_t first_slot, GeometryCounts& counts) {                      \
+    return transform_lanes(triangles, n, first_id, t, options, slots, first_slot, counts);   \
+  }
+RASTERBENCH_TRANSFORM(transform_floats, ScreenTriangle<float>)
+RASTERBENCH_TRANSFORM(transform_doubles, ScreenTriangle<double>)
+RASTERBENCH_TRANSFORM(transform_float_batch, ScreenBatch<float>)
+#undef RASTERBENCH_TRANSFORM
 
 }  // namespace
 }  // namespace HWY_NAMESPACE
@@ -254,26 +276,23 @@ namespace {
 
 HWY_EXPORT(transform_floats);
 HWY_EXPORT(transform_doubles);
+HWY_EXPORT(transform_float_batch);
 
 }  // namespace
 
-template <>
-std::uint64_t transform_in_lanes(const Triangle* triangles, std::int64_t n, std::int32_t first_id,
-                                 const ScreenTransform& transform, const GeometryOptions& options,
-                                 ScreenTriangle<float>* slots, GeometryCounts& counts) {
-  if (options.isa == Isa::kBaseline) return ~std::uint64_t{0} >> (kMaxLaneTriangles - n);
-  return RASTERBENCH_DISPATCH(transform_floats, options.isa)(triangles, n, first_id, transform, options,
-                                                             slots, counts);
-}
-
-template <>
-std::uint64_t transform_in_lanes(const Triangle* triangles, std::int64_t n, std::int32_t first_id,
-                                 const ScreenTransform& transform, const GeometryOptions& options,
-                                 ScreenTriangle<double>* slots, GeometryCounts& counts) {
-  if (options.isa == Isa::kBaseline) return ~std::uint64_t{0} >> (kMaxLaneTriangles - n);
-  return RASTERBENCH_DISPATCH(transform_doubles, options.isa)(triangles, n, first_id, transform, options,
-                                                              slots, counts);
-}
+#define RASTERBENCH_TRANSFORM(name, Slots)                                                            \
+  template <>                                                                                         \
+  std::uint64_t transform_in_lanes(const Triangle* triangles, std::int64_t n, std::int32_t first_id,  \
+                                   const ScreenTransform& transform, const GeometryOptions& options,  \
+                                   Slots* slots, std::int64_t first_slot, GeometryCounts& counts) {   \
+    if (options.isa == Isa::kBaseline) return ~std::uint64_t{0} >> (kMaxLaneTriangles - n);           \
+    return RASTERBENCH_DISPATCH(name, options.isa)(triangles, n, first_id, transform, options, slots, \
+                                                   first_slot, counts);                               \
+  }
+RASTERBENCH_TRANSFORM(transform_floats, ScreenTriangle<float>)
+RASTERBENCH_TRANSFORM(transform_doubles, ScreenTriangle<double>)
+RASTERBENCH_TRANSFORM(transform_float_batch, ScreenBatch<float>)
+#undef RASTERBENCH_TRANSFORM
 
 }  // namespace rasterbench
 #endif  // HWY_ONCE

@@ -5,6 +5,7 @@
 
 #include "base/isa.h"
 #include "pipeline/geometry.h"
+#include "pipeline/screen_batch.h"
 
 namespace rasterbench {
 
@@ -15,9 +16,11 @@ inline constexpr std::int64_t kMaxLaneTriangles = 64;
 /// they are: their slots are written and they are counted. Bit i of the answer says that triangle i was left
 /// untouched, because a plane cuts it or it has no lane. The arithmetic is that of corner.h, operation by
 /// operation, so that the result is the same to the bit. With Isa::kBaseline nothing is done.
-template <class Real>
+/// `Slots` is ScreenTriangle<Real>, an array of them, or one ScreenBatch<float>; triangle 0 goes to
+/// first_slot.
+template <class Slots>
 std::uint64_t transform_in_lanes(const Triangle* triangles, std::int64_t n, std::int32_t first_id,
                                  const ScreenTransform& transform, const GeometryOptions& options,
-                                 ScreenTriangle<Real>* slots, GeometryCounts& counts);
+                                 Slots* slots, std::int64_t first_slot, GeometryCounts& counts);
 
 }  // namespace rasterbench

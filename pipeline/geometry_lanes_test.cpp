@@ -92,13 +92,13 @@ TEST(GeometryLanesOfOneCall, LeaveWhatHasNoLane) {
   std::vector<ScreenTriangle<float>> slots(64);
   GeometryCounts counts;
   const ScreenTransform transform = make_screen_transform(plain_camera(kSide, kSide));
-  EXPECT_EQ(transform_in_lanes(triangles.data(), 64, 0, transform, {}, slots.data(), counts),
+  EXPECT_EQ(transform_in_lanes(triangles.data(), 64, 0, transform, {}, slots.data(), 0, counts),
             ~std::uint64_t{0});
-  EXPECT_EQ(transform_in_lanes(triangles.data(), 3, 0, transform, {}, slots.data(), counts), 7u);
+  EXPECT_EQ(transform_in_lanes(triangles.data(), 3, 0, transform, {}, slots.data(), 0, counts), 7u);
   if (!is_supported(Isa::kAvx2)) GTEST_SKIP() << "this CPU has no avx2";
   const GeometryOptions options{.isa = Isa::kAvx2};
-  EXPECT_EQ(transform_in_lanes(triangles.data(), 3, 0, transform, options, slots.data(), counts), 7u);
-  EXPECT_EQ(transform_in_lanes(triangles.data(), 7, 0, transform, options, slots.data(), counts) >> 4, 7u);
+  EXPECT_EQ(transform_in_lanes(triangles.data(), 3, 0, transform, options, slots.data(), 0, counts), 7u);
+  EXPECT_EQ(transform_in_lanes(triangles.data(), 7, 0, transform, options, slots.data(), 0, counts) >> 4, 7u);
 }
 
 }  // namespace
