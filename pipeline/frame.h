@@ -23,6 +23,16 @@
 
 namespace rasterbench {
 
+/// What makes a frame fast and never changes its picture: each can be switched off, to see what it gives.
+struct Techniques {
+  bool fragments = true;      ///< tiny triangles are sampled where they are transformed
+  bool front_to_back = true;  ///< large triangles of a tile in order of depth; what is hidden is left out
+  bool streaming = true;      ///< colours and depths bypass the caches on their way to memory
+  bool huge_pages = true;     ///< buffers lie in pages of 2 MiB where the system has them
+
+  bool operator==(const Techniques&) const = default;
+};
+
 /// Everything that the picture depends on besides the scene and the numeric mode.
 struct FrameSettings {
   int width = 0;
@@ -33,6 +43,7 @@ struct FrameSettings {
   int tile = 64;  ///< side of the tiles in pixels, for the kernels that have tiles; never changes the picture
   /// kMinimal: the renderer sets geometry.needs from the scene; kFull: geometry.needs is taken as it is.
   Generality generality = Generality::kMinimal;
+  Techniques techniques = {};  ///< never change the picture
 
   PixelBox bounds() const { return {0, 0, width, height}; }
   SampleGrid grid() const { return {fill, width, height}; }
@@ -122,6 +133,10 @@ struct RendererSetup {
   /// Not 0: the screen triangles reach the kernel in a random order of this seed. For verification: the
   /// picture must not care.
   std::uint64_t permutation_seed = 0;
+  /// Whether Renderer::ids() will be asked for: a kernel that has them nowhere else then writes them.
+  bool keeps_ids = true;
+  /// Bytes that a kernel which bins may fill before it draws what it has binned.
+  std::size_t stream_budget = std::size_t{1} << 30;
   /// Fills FrameReport::counters. The picture is the same; the times are not those of a frame.
   bool count = false;
 };

@@ -1,0 +1,280 @@
+// fused_tiles: sort-middle with both ends fused to it, so that a frame has two loops.
+//
+// The front end takes world triangles a batch at a time, transforms them in L1 and hands what may cover a
+// sample to the tiles: tiny triangles as the fragments that they cover, others as triangles (tile_streams.h).
+// The back end, which is the loop under study, takes one tile at a time, draws it in L1 and writes its
+// colours and depths to memory. No array of screen triangles, no visibility buffer, and each byte of the
+// picture written once. Abrash, Rasterization on Larrabee, 2009, has the tiles and triangles in lanes; Laine
+// & Karras, High-performance software rasterization on GPUs, 2011, the size classes.
+//
+// Memory: the streams take 12 bytes for each fragment of a tiny triangle and 40 bytes for each tile that
+// another triangle's box touches, in blocks that each worker keeps between frames. Where a scene would fill
+// more than the budget of the streams (RendererSetup), the frame is drawn in rounds: front end until it is
+// full, tiles, and so on, with 8 bytes a pixel for what was drawn so far.
+#include <fmt/format.h>
+
+#include <atomic>
+#include <bit>
+#include <chrono>
+#include <numeric>
+
+#include "kernels/kernel.h"
+#include "kernels/tile_lanes.h"
+
+namespace rasterbench {
+namespace {
+
+constexpr KernelInfo kInfo{
+    .name = "fused_tiles",
+    .parallel_unit = "a square tile (--tile, 64 pixels; a power of two from 8 to 128)",
+    .synchronisation = "none: a worker fills streams of its own, an iteration owns its tile",
+    .work = "T + tiles of all boxes + B, in vectors",
+    .has_tiles = true,
+    .needs = "has its loops in the integers of fixed_8"};
+
+/// log2 of the side of the tiles: that of `tile` rounded down to a power of two from 8 to 128.
+int tile_shift(int tile) { return std::bit_width(static_cast<unsigned>(std::clamp(tile, 8, 128))) - 1; }
+
+class FusedTiles final : public Renderer {
+ public:
+  explicit FusedTiles(const RendererSetup& setup)
+      : scene_(*setup.scene),
+        settings_(checked(setup.settings)),
+        camera_(sized_camera(scene_, settings_)),
+        permutation_seed_(setup.permutation_seed),
+        stream_budget_(setup.stream_budget),
+        execution_(make_execution(setup.execution)),
+        lanes_(tile_lanes(settings_.geometry.isa)),
+        tile_settings_{.grid = TileGrid(settings_.width, settings_.height, tile_shift(settings_.tile)),
+                       .fill = settings_.fill,
+                       .tie = settings_.tie,
+                       .triangle_count = static_cast<std::int64_t>(triangles().size()),
+                       .techniques = settings_.techniques},
+        batches_((triangles().size() + kBatch - 1) / kBatch),
+        workers_(static_cast<std::size_t>(execution_->threads())),
+        colours_(settings_.pixels(), "the colour buffer"),
+        depths_(settings_.pixels(), "the depth buffer"),
+        ids_(setup.keeps_ids ? settings_.pixels() : 0, "the ids") {
+    if (settings_.generality == Generality::kMinimal)
+      settings_.geometry.needs =
+          analyse_needs(triangles(), make_screen_transform(camera_, Fixed8::kDepthFunction),
+                        settings_.geometry.near_rule)
+              .needs;
+    order_.resize(batches_.size());
+    std::iota(order_.begin(), order_.end(), 0u);
+    if (permutation_seed_ != 0) shuffle(order_.data(), order_.size(), Random(permutation_seed_));
+    for (std::unique_ptr<Worker>& worker : workers_) {
+      worker = std::make_unique<Worker>(tile_settings_.grid);
+      worker->scratch.isa = settings_.geometry.isa;
+      front_ends_.push_back(&worker->front_end);
+    }
+  }
+
+  const FrameReport& draw() override {
+    report_.seconds = {};
+    execution_->reset_tally();
+    for (Batch& batch : batches_) batch = {};
+    bool first_round = true, last_round = false;
+    while (!last_round) {
+      report_.seconds.geometry += timed([&] { last_round = fill_streams(); });
+      report_.seconds.raster += timed([&] { draw_tiles(first_round, last_round); });
+      first_round = false;
+    }
+    report_.raster_tally.assign(execution_->tally().begin(), execution_->tally().end());
+    report_.counts = std::accumulate(batches_.begin(), batches_.end(), GeometryCounts{},
+                                     [](GeometryCounts sum, const Batch& b) { return sum += b.counts; });
+    return report_;
+  }
+
+  std::span<const std::uint32_t> colours() const override { return colours_.span(); }
+  std::span<const float> depths() const override { return depths_.span(); }
+
+  std::vector<std::int32_t> ids() const override {
+    if (ids_.size() != settings_.pixels()) throw std::logic_error("fused_tiles was not asked to keep ids");
+    return {ids_.data(), ids_.data() + ids_.size()};
+  }
+
+  std::vector<double> values() const override {
+    return {depths_.data(), depths_.data() + depths_.size()};  // the far plane lies at 1 in both
+  }
+
+  std::size_t bytes() const override {
+    std::size_t sum = colours_.bytes() + depths_.bytes() + kept_depths_.bytes() + kept_ranks_.bytes();
+    for (const auto& worker : workers_)
+      sum += sizeof(Worker) + worker->front_end.fragments.bytes() + worker->front_end.triangles.bytes() +
+             worker->scratch.depths.bytes() + worker->scratch.ranks.bytes();
+    return sum;
+  }
+
+ private:
+  static constexpr std::size_t kBatch = ScreenBatch<float>::kSize;
+
+  /// What becomes of kBatch triangles.
+  struct Batch {
+    GeometryCounts counts;
+    std::size_t parts_done = 0;  ///< ScreenBatches of this frame that were drawn or are in the streams
+    bool done = false;
+  };
+
+  struct Worker {
+    explicit Worker(const TileGrid& grid) : scratch(grid) {}
+
+    FrontEnd front_end;
+    TileScratch scratch;
+    ScreenBatch<float> screen;
+    std::vector<ScreenTriangle<float>> extra;  ///< further pieces of clipped triangles
+    /// Spare blocks that were missing, of each kind; 0: none.
+    std::int64_t missing_fragment_blocks = 0, missing_triangle_blocks = 0;
+  };
+
+  static const FrameSettings& checked(const FrameSettings& settings) {
+    checked_bytes(settings.pixels(), 3 * (sizeof(std::uint32_t) + sizeof(float)),
+                  fmt::format("an image of {}x{}", settings.width, settings.height));
+    return settings;
+  }
+
+  std::span<const Triangle> triangles() const { return scene_.model.triangles; }
+
+  template <class T>
+  static void shuffle(T* elements, std::size_t size, Random random) {
+    for (std::size_t i = size; i > 1; --i) std::swap(elements[i - 1], elements[random.bits() % i]);
+  }
+
+  /// Transforms batches into the streams until all are done or no room is left; whether all are.
+  bool fill_streams() {
+    for (const auto& worker : workers_) {
+      worker->front_end.fragments.reset(tile_settings_.grid.tiles());
+      worker->front_end.triangles.reset(tile_settings_.grid.tiles());
+    }
+    const ScreenTransform transform = make_screen_transform(camera_, Fixed8::kDepthFunction);
+    for (;;) {
+      std::atomic<bool> all_done = true;
+      execution_->uniform_loop(static_cast<std::int64_t>(batches_.size()), [&](std::int64_t i, int worker) {
+        if (!fill(order_[static_cast<std::size_t>(i)], transform,
+                  *workers_[static_cast<std::size_t>(worker)]))
+          all_done.store(false, std::memory_order_relaxed);
+      });
+      if (all_done) return true;
+      if (!grow_streams()) return false;
+    }
+  }
+
+  /// One batch; false where some of it found no room.
+  bool fill(std::size_t number, const ScreenTransform& transform, Worker& worker) {
+    Batch& batch = batches_[number];
+    if (batch.done) return true;
+    if (worker.missing_triangle_blocks + worker.missing_fragment_blocks > 0) return false;
+    const std::size_t first = number * kBatch;
+    worker.extra.clear();
+    batch.counts = {};
+    transform_triangles(triangles().subspan(first, std::min(kBatch, triangles().size() - first)),
+                        static_cast<std::int32_t>(first), transform, settings_.geometry, worker.screen,
+                        worker.extra, batch.counts);
+    if (batch.parts_done == 0 && !append(worker.screen, worker)) return false;
+    batch.parts_done = std::max<std::size_t>(batch.parts_done, 1);
+    for (std::size_t begin = 0, part = 1; begin < worker.extra.size(); begin += kBatch, ++part) {
+      if (part < batch.parts_done) continue;
+      for (std::size_t i = 0; i < kBatch; ++i)
+        worker.screen.set(i, begin + i < worker.extra.size() ? worker.extra[begin + i]
+                                                             : ScreenTriangle<float>{{}, {}, {}, -1});
+      if (!append(worker.screen, worker)) return false;
+      batch.parts_done = part + 1;
+    }
+    batch.done = true;
+    return true;
+  }
+
+  bool append(ScreenBatch<float>& screen, Worker& worker) {
+    FrontEnd& front_end = worker.front_end;
+    lanes_.select(screen, tile_settings_, front_end);
+    // A vector of fragments may need a new block each time it is stored, a triangle one in every tile.
+    const std::int64_t fragment_blocks = 4 * front_end.survivors.size;
+    if (front_end.fragments.spare_blocks() < fragment_blocks ||
+        front_end.triangles.spare_blocks() < front_end.survivors.tiles) {
+      worker.missing_fragment_blocks = fragment_blocks;
+      worker.missing_triangle_blocks = front_end.survivors.tiles;
+      return false;
+    }
+    lanes_.distribute(tile_settings_, front_end);
+    return true;
+  }
+
+  /// Makes room for the workers that ran out of it; false where that would exceed the budget and there is
+  /// something to draw first.
+  bool grow_streams() {
+    std::size_t bytes = 0;
+    bool empty = true;
+    for (const auto& worker : workers_) {
+      bytes += worker->front_end.fragments.bytes() + worker->front_end.triangles.bytes();
+      empty =
+          empty && worker->front_end.fragments.used_blocks() + worker->front_end.triangles.used_blocks() == 0;
+    }
+    const bool may_grow = empty || bytes < stream_budget_;
+    for (const auto& worker : workers_) {
+      if (may_grow && worker->missing_fragment_blocks > 0) {
+        // Doubling, so that the first frame grows few times.
+        worker->front_end.fragments.grow(worker->missing_fragment_blocks +
+                                         (empty ? 0 : worker->front_end.fragments.used_blocks()));
+        worker->front_end.triangles.grow(worker->missing_triangle_blocks +
+                                         (empty ? 0 : worker->front_end.triangles.used_blocks()));
+      }
+      worker->missing_fragment_blocks = worker->missing_triangle_blocks = 0;
+    }
+    return may_grow;
+  }
+
+  void draw_tiles(bool first_round, bool last_round) {
+    if (!last_round && kept_depths_.size() == 0) {
+      kept_depths_ = Buffer<float>(settings_.pixels(), "what is drawn so far");
+      kept_ranks_ = Buffer<std::int32_t>(settings_.pixels(), "what is drawn so far");
+    }
+    const TileOutput output{scene_, colours_.data(), depths_.data(), ids_.size() > 0 ? ids_.data() : nullptr};
+    execution_->loop(tile_settings_.grid.tiles(), [&](std::int64_t tile, int worker) {
+      lanes_.draw({tile, front_ends_, kept_depths_.data(), kept_ranks_.data(), first_round, last_round},
+                  tile_settings_, workers_[static_cast<std::size_t>(worker)]->scratch, output);
+    });
+  }
+
+  template <class Stage>
+  static double timed(Stage stage) {
+    const auto begin = std::chrono::steady_clock::now();
+    stage();
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  }
+
+  const Scene& scene_;
+  FrameSettings settings_;
+  Camera camera_;
+  std::uint64_t permutation_seed_;
+  std::size_t stream_budget_;
+  std::unique_ptr<Execution> execution_;
+  const TileLanes& lanes_;
+  TileSettings tile_settings_;
+  std::vector<Batch> batches_;
+  std::vector<std::uint32_t> order_;  ///< in which the batches are taken
+  std::vector<std::unique_ptr<Worker>> workers_;
+  std::vector<const FrontEnd*> front_ends_;
+  Buffer<std::uint32_t> colours_;
+  Buffer<float> depths_;
+  Buffer<std::int32_t> ids_;
+  Buffer<float> kept_depths_;
+  Buffer<std::int32_t> kept_ranks_;
+  FrameReport report_;
+};
+
+std::vector<Kernel::Variant> variants() {
+  std::vector<Kernel::Variant> all;
+  for (const ModeInfo& mode : mode_infos()) {
+    if (mode.name == Fixed8::kInfo.name)
+      all.push_back(
+          {mode.name, [](const RendererSetup& setup) { return std::make_unique<FusedTiles>(setup); }, {}});
+    else
+      all.push_back({mode.name, {}, kInfo.needs});
+  }
+  return all;
+}
+
+const bool kRegistered = (register_kernel(Kernel(kInfo, variants())), true);
+
+}  // namespace
+}  // namespace rasterbench

@@ -1,0 +1,791 @@
+#include "kernels/tile_lanes.h"
+
+#include <hwy/cache_control.h>
+
+#include <algorithm>
+#include <bit>
+#include <limits>
+
+#include "base/isa_dispatch.h"
+#include "kernels/fragments.h"
+#include "numeric/modes.h"
+#include "pipeline/resolve.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "kernels/tile_lanes.cpp"
+#include <hwy/foreach_target.h>
+// After foreach_target.h:
+#include <hwy/highway.h>
+
+#include "kernels/fixed_lanes-inl.h"
+
+#ifndef RASTERBENCH_TILE_LANES_ONCE
+#define RASTERBENCH_TILE_LANES_ONCE
+namespace rasterbench {
+namespace {
+
+/// The depth of an empty pixel: with kNoRank it is the mode's kClear, so that d = 1 is not drawn.
+constexpr float kClearDepth = 0x1.fffffep-1f;
+
+/// A tile's pixels while it is drawn.
+struct TilePixels {
+  float* depths;
+  std::int32_t* ranks;
+  std::int64_t pitch;
+  PixelBox box;  ///< of the image
+
+  std::int32_t width() const { return box.x1 - box.x0; }
+  std::int32_t height() const { return box.y1 - box.y0; }
+
+  /// Keeps a fragment if its key is smaller.
+  void keep(std::int64_t place, float depth, std::int32_t rank) {
+    if (depth < depths[place] || (depth == depths[place] && rank < ranks[place])) {
+      depths[place] = depth;
+      ranks[place] = rank;
+    }
+  }
+};
+
+void clear(TilePixels& tile, int side) {
+  for (int y = 0; y < side; ++y) {
+    float* depths = tile.depths + y * tile.pitch;
+    const std::int32_t inside = y < tile.height() ? tile.width() : 0;
+    std::fill_n(depths, inside, kClearDepth);
+    std::fill(depths + inside, depths + tile.pitch, -std::numeric_limits<float>::infinity());
+    std::fill_n(tile.ranks + y * tile.pitch, tile.pitch, kNoRank);
+  }
+}
+
+/// Keeps a tile until the next round, and brings it back.
+void save(const TilePixels& tile, int image_width, float* depths, std::int32_t* ranks) {
+  for (std::int32_t y = 0; y < tile.height(); ++y) {
+    const std::int64_t at = std::int64_t{tile.box.y0 + y} * image_width + tile.box.x0;
+    std::copy_n(tile.depths + y * tile.pitch, tile.width(), depths + at);
+    std::copy_n(tile.ranks + y * tile.pitch, tile.width(), ranks + at);
+  }
+}
+void load(TilePixels& tile, int image_width, const float* depths, const std::int32_t* ranks) {
+  for (std::int32_t y = 0; y < tile.height(); ++y) {
+    const std::int64_t at = std::int64_t{tile.box.y0 + y} * image_width + tile.box.x0;
+    std::copy_n(depths + at, tile.width(), tile.depths + y * tile.pitch);
+    std::copy_n(ranks + at, tile.width(), tile.ranks + y * tile.pitch);
+  }
+}
+
+float as_float(std::uint32_t bits) { return std::bit_cast<float>(bits); }
+std::uint32_t as_bits(float value) { return std::bit_cast<std::uint32_t>(value); }
+
+/// Entry i of a block, as a screen triangle without its id.
+ScreenTriangle<float> triangle_of(const TriangleStreams::Block& block, std::size_t i) {
+  ScreenTriangle<float> t{};
+  for (int corner = 0; corner < 3; ++corner) {
+    t.x[corner] = as_float(block.fields[corner][i]);
+    t.y[corner] = as_float(block.fields[3 + corner][i]);
+    t.d[corner] = as_float(block.fields[6 + corner][i]);
+  }
+  return t;
+}
+
+/// One triangle of any size, pixel by pixel.
+template <NumericMode Mode>
+void draw_one_by_one(const TriangleStreams::Block& block, std::size_t i, const SampleGrid& grid,
+                     TilePixels& tile) {
+  const std::uint32_t rank = block.fields[9][i];
+  const auto prepared = Mode::prepare(triangle_of(block, i), grid, rank);
+  const PixelBox box = intersect(prepared.box, tile.box);
+  for_each_fragment<Mode>(prepared, box, [&](std::int32_t x, std::int32_t y, typename Mode::Key key) {
+    tile.keep((y - tile.box.y0) * tile.pitch + (x - tile.box.x0),
+              decode(static_cast<std::uint32_t>(key >> 32)), static_cast<std::int32_t>(rank));
+  });
+}
+
+/// Appends survivor i to every tile that its box touches. `box` lies within the image.
+void append_to_tiles(const FrontEnd::Survivors& from, std::size_t i, const PixelBox& box,
+                     const TileGrid& grid, TriangleStreams& streams) {
+  for (std::int64_t row = box.y0 >> grid.shift; row <= (box.y1 - 1) >> grid.shift; ++row)
+    for (std::int64_t column = box.x0 >> grid.shift; column <= (box.x1 - 1) >> grid.shift; ++column) {
+      TriangleStreams::Block& block = streams.room(row * grid.columns + column);
+      const auto end = static_cast<std::size_t>(block.size++);
+      for (int corner = 0; corner < 3; ++corner) {
+        block.fields[corner][end] = as_bits(from.x[corner][i]);
+        block.fields[3 + corner][end] = as_bits(from.y[corner][i]);
+        block.fields[6 + corner][end] = as_bits(from.d[corner][i]);
+      }
+      block.fields[9][end] = static_cast<std::uint32_t>(from.ranks[i]);
+    }
+}
+
+}  // namespace
+}  // namespace rasterbench
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace rasterbench {
+namespace HWY_NAMESPACE {
+namespace {
+
+using Doubles = hn::ScalableTag<double>;
+using HalfIntegers = hn::Rebind<std::int32_t, Doubles>;  // as many as there are doubles in a vector
+constexpr Doubles kDoubles;
+constexpr HalfIntegers kHalfIntegers;
+using Double = hn::Vec<Doubles>;
+
+constexpr auto kWidth = static_cast<std::int32_t>(kLanes);
+
+HWY_INLINE Integer integer(std::int32_t value) { return hn::Set(kIntegers, value); }
+
+HWY_INLINE std::uint32_t bits_of(IntegerMask mask) {
+  std::uint8_t bytes[8] = {};
+  hn::StoreMaskBits(kIntegers, mask, bytes);
+  return bytes[0] | std::uint32_t{bytes[1]} << 8;  // at most 16 lanes
+}
+
+/// The pixels of the image in the lanes' boxes.
+struct LaneBox {
+  Integer x0, y0, x1, y1;
+
+  HWY_INLINE IntegerMask holds_a_sample() const { return hn::And(hn::Lt(x0, x1), hn::Lt(y0, y1)); }
+};
+
+HWY_INLINE LaneBox whole_box(const Integer (&x)[3], const Integer (&y)[3]) {
+  return {first_pixel(hn::Min(hn::Min(x[0], x[1]), x[2])), first_pixel(hn::Min(hn::Min(y[0], y[1]), y[2])),
+          end_pixel(hn::Max(hn::Max(x[0], x[1]), x[2])), end_pixel(hn::Max(hn::Max(y[0], y[1]), y[2]))};
+}
+
+HWY_INLINE LaneBox within(const LaneBox& box, std::int32_t width, std::int32_t height) {
+  const Integer zero = hn::Zero(kIntegers);
+  return {hn::Max(box.x0, zero), hn::Max(box.y0, zero), hn::Min(box.x1, integer(width)),
+          hn::Min(box.y1, integer(height))};
+}
+
+/// The tiles at the corners of boxes that hold a sample.
+struct LaneTiles {
+  Integer x0, y0, x1, y1;
+
+  HWY_INLINE LaneTiles(const LaneBox& box, int shift)
+      : x0(hn::ShiftRightSame(box.x0, shift)),
+        y0(hn::ShiftRightSame(box.y0, shift)),
+        x1(hn::ShiftRightSame(hn::Sub(box.x1, integer(1)), shift)),
+        y1(hn::ShiftRightSame(hn::Sub(box.y1, integer(1)), shift)) {}
+};
+
+void select(const ScreenBatch<float>& in, const TileSettings& settings, FrontEnd& front_end) {
+  FrontEnd::Survivors& out = front_end.survivors;
+  const TileGrid& grid = settings.grid;
+  std::size_t size = 0;
+  Integer tiles = hn::Zero(kIntegers);
+  const bool first_wins = settings.tie == TieRule::kFirst;
+  const auto last_id = integer(static_cast<std::int32_t>(settings.triangle_count - 1));
+  for (std::size_t first = 0; first < ScreenBatch<float>::kSize; first += kLanes) {
+    const Integer ids = hn::Load(kIntegers, in.ids + first);
+    IntegerMask draws = hn::Gt(ids, integer(-1));
+    if (hn::AllFalse(kIntegers, draws)) continue;
+    Float px[3], py[3];
+    Integer x[3], y[3];
+    for (int i = 0; i < 3; ++i) {
+      px[i] = hn::Load(kFloats, in.x[i] + first);
+      py[i] = hn::Load(kFloats, in.y[i] + first);
+      x[i] = snapped(px[i]);
+      y[i] = snapped(py[i]);
+    }
+    const LaneBox box = within(whole_box(x, y), grid.width, grid.height);
+    draws = hn::And(draws, box.holds_a_sample());
+    if (hn::AllFalse(kIntegers, draws)) continue;
+    const LaneTiles corner(box, grid.shift);
+    const Integer touched = hn::Mul(hn::Add(hn::Sub(corner.x1, corner.x0), integer(1)),
+                                    hn::Add(hn::Sub(corner.y1, corner.y0), integer(1)));
+    tiles = hn::Add(tiles, hn::IfThenElseZero(draws, touched));
+    const FloatMask draws_float = hn::RebindMask(kFloats, draws);
+    for (int i = 0; i < 3; ++i) {
+      hn::StoreU(hn::Compress(px[i], draws_float), kFloats, out.x[i] + size);
+      hn::StoreU(hn::Compress(py[i], draws_float), kFloats, out.y[i] + size);
+      hn::StoreU(hn::Compress(hn::Load(kFloats, in.d[i] + first), draws_float), kFloats, out.d[i] + size);
+    }
+    const Integer ranks = first_wins ? ids : hn::Sub(last_id, ids);
+    hn::StoreU(hn::Compress(ranks, draws), kIntegers, out.ranks + size);
+    size += hn::CountTrue(kIntegers, draws);
+  }
+  alignas(64) std::int32_t sums[kLanes];
+  hn::Store(tiles, kIntegers, sums);
+  out.size = static_cast<std::int64_t>(size);
+  out.tiles = 0;
+  for (const std::int32_t sum : sums) out.tiles += sum;
+}
+
+/// The samples of a vector of tiny triangles: boxes of at most 2 x 2 pixels, each within one tile.
+struct TinySamples {
+  static constexpr int kSide = 2, kPlaces = kSide * kSide;
+  IntegerMask covered[kPlaces];
+  Float depths[kPlaces];
+  Integer places[kPlaces];  ///< in the tile
+};
+
+HWY_INLINE TinySamples sample_tiny(const LaneCorner (&unsorted)[3], const LaneBox& box,
+                                   const TileGrid& grid, FillRule fill) {
+  LaneCorner corners[3] = {unsorted[0], unsorted[1], unsorted[2]};
+  sort_corners(corners);
+  SmallEdges edges = small_edges(corners, box.x0, box.y0, fill);
+  const LanePlane plane = depth_plane(corners);
+  const Integer in_tile = integer(grid.side() - 1);
+  const Integer place =
+      hn::Add(hn::Mul(hn::And(box.y0, in_tile), integer(grid.pitch())), hn::And(box.x0, in_tile));
+  TinySamples samples;
+  for (int row = 0; row < TinySamples::kSide; ++row) {
+    const Integer y = hn::Add(box.y0, integer(row));
+    const Float of_row = depth_of_row(plane, sample_of(y));
+    const IntegerMask in_row = hn::And(edges.draws, hn::Lt(y, box.y1));
+    for (int column = 0; column < TinySamples::kSide; ++column) {
+      const int i = row * TinySamples::kSide + column;
+      Integer e[3];
+      for (int k = 0; k < 3; ++k)
+        e[k] = column == 0 ? edges.value[k] : hn::Add(edges.value[k], edges.per_column[k]);
+      const Integer x = hn::Add(box.x0, integer(column));
+      samples.covered[i] =
+          hn::And(hn::And(in_row, hn::Lt(x, box.x1)), hn::Gt(hn::Or(hn::Or(e[0], e[1]), e[2]), integer(-1)));
+      samples.depths[i] = depth_at(plane, of_row, sample_of(x));
+      samples.places[i] = hn::Add(place, integer(row * grid.pitch() + column));
+    }
+    for (int k = 0; k < 3; ++k) edges.value[k] = hn::Add(edges.value[k], edges.per_row[k]);
+  }
+  return samples;
+}
+
+/// Calls visit(tile, mask) for each tile among the lanes of `lanes`.
+template <class Visit>
+HWY_INLINE void for_each_tile(IntegerMask lanes, Integer tiles, Visit visit) {
+  alignas(64) std::int32_t tile_of[kLanes];
+  hn::Store(tiles, kIntegers, tile_of);
+  for (std::uint32_t left = bits_of(lanes); left != 0;) {
+    const std::int32_t tile = tile_of[std::countr_zero(left)];
+    const IntegerMask here = hn::And(lanes, hn::Eq(tiles, integer(tile)));
+    visit(tile, here);
+    left &= ~bits_of(here);
+  }
+}
+
+HWY_INLINE void append(Integer v, IntegerMask mask, std::uint32_t* to) {
+  hn::StoreU(hn::BitCast(kCodes, hn::Compress(v, mask)), kCodes, to);
+}
+HWY_INLINE void append(Float v, IntegerMask mask, std::uint32_t* to) {
+  append(hn::BitCast(kIntegers, v), mask, to);
+}
+
+void distribute(const TileSettings& settings, FrontEnd& front_end) {
+  const FrontEnd::Survivors& from = front_end.survivors;
+  const TileGrid& grid = settings.grid;
+  for (std::int64_t first = 0; first < from.size; first += kWidth) {
+    const auto at = static_cast<std::size_t>(first);
+    const IntegerMask valid = hn::FirstN(kIntegers, static_cast<std::size_t>(from.size - first));
+    Float px[3], py[3];
+    LaneCorner corners[3];
+    Integer x[3], y[3];
+    for (int i = 0; i < 3; ++i) {
+      px[i] = hn::LoadU(kFloats, from.x[i] + at);
+      py[i] = hn::LoadU(kFloats, from.y[i] + at);
+      x[i] = snapped(px[i]);
+      y[i] = snapped(py[i]);
+      corners[i] = {x[i], y[i], hn::LoadU(kFloats, from.d[i] + at)};
+    }
+    const Integer ranks = hn::LoadU(kIntegers, from.ranks + at);
+    const LaneBox whole = whole_box(x, y), box = within(whole, grid.width, grid.height);
+    const LaneTiles corner(box, grid.shift);
+    const IntegerMask in_one =
+        hn::And(valid, hn::And(hn::Eq(corner.x0, corner.x1), hn::Eq(corner.y0, corner.y1)));
+    const Integer tiles =
+        hn::Add(hn::Mul(corner.y0, integer(static_cast<std::int32_t>(grid.columns))), corner.x0);
+
+    IntegerMask rest = in_one;
+    if (settings.techniques.fragments) {
+      const auto at_most_2 = [](Integer low, Integer high) HWY_ATTR {
+        return hn::Lt(hn::Sub(high, low), integer(TinySamples::kSide + 1));
+      };
+      const IntegerMask tiny =
+          hn::And(in_one, hn::And(at_most_2(whole.x0, whole.x1), at_most_2(whole.y0, whole.y1)));
+      if (!hn::AllFalse(kIntegers, tiny)) {
+        const TinySamples samples = sample_tiny(corners, box, grid, settings.fill);
+        IntegerMask any = hn::And(tiny, samples.covered[0]);
+        for (int i = 1; i < TinySamples::kPlaces; ++i) any = hn::Or(any, hn::And(tiny, samples.covered[i]));
+        for_each_tile(any, tiles, [&](std::int32_t tile, IntegerMask here) HWY_ATTR {
+          for (int i = 0; i < TinySamples::kPlaces; ++i) {
+            const IntegerMask mask = hn::And(here, samples.covered[i]);
+            if (hn::AllFalse(kIntegers, mask)) continue;
+            FragmentStreams::Block& block = front_end.fragments.room(tile);
+            append(samples.depths[i], mask, block.fields[0] + block.size);
+            append(ranks, mask, block.fields[1] + block.size);
+            append(samples.places[i], mask, block.fields[2] + block.size);
+            block.size += static_cast<std::int64_t>(hn::CountTrue(kIntegers, mask));
+          }
+        });
+        rest = hn::AndNot(tiny, in_one);
+      }
+    }
+    for_each_tile(rest, tiles, [&](std::int32_t tile, IntegerMask here) HWY_ATTR {
+      TriangleStreams::Block& block = front_end.triangles.room(tile);
+      for (int i = 0; i < 3; ++i) {
+        append(px[i], here, block.fields[i] + block.size);
+        append(py[i], here, block.fields[3 + i] + block.size);
+        append(corners[i].d, here, block.fields[6 + i] + block.size);
+      }
+      append(ranks, here, block.fields[9] + block.size);
+      block.size += static_cast<std::int64_t>(hn::CountTrue(kIntegers, here));
+    });
+    const IntegerMask in_many = hn::AndNot(in_one, valid);
+    if (hn::AllFalse(kIntegers, in_many)) continue;
+    alignas(64) std::int32_t x0[kLanes], y0[kLanes], x1[kLanes], y1[kLanes];
+    hn::Store(box.x0, kIntegers, x0);
+    hn::Store(box.y0, kIntegers, y0);
+    hn::Store(box.x1, kIntegers, x1);
+    hn::Store(box.y1, kIntegers, y1);
+    for (std::uint32_t left = bits_of(in_many); left != 0; left &= left - 1) {
+      const auto lane = static_cast<std::size_t>(std::countr_zero(left));
+      append_to_tiles(from, at + lane, {x0[lane], y0[lane], x1[lane], y1[lane]}, grid, front_end.triangles);
+    }
+  }
+}
+
+/// Integers in double, in which products of coordinates are exact: a vector's, in as many vectors as they
+/// take.
+struct Wide {
+  static constexpr std::size_t kParts = kLanes / hn::MaxLanes(kDoubles);
+  Double parts[kParts];
+};
+HWY_INLINE Wide wide(Integer v) {
+#if HWY_TARGET == HWY_SCALAR  // a vector of one lane has no halves
+  return {{hn::PromoteTo(kDoubles, v)}};
+#else
+  return {
+      {hn::PromoteTo(kDoubles, hn::LowerHalf(v)), hn::PromoteTo(kDoubles, hn::UpperHalf(kHalfIntegers, v))}};
+#endif
+}
+template <class Function>
+HWY_INLINE Integer narrow(const Wide& v, Function function) {
+#if HWY_TARGET == HWY_SCALAR
+  return hn::DemoteTo(kHalfIntegers, function(v.parts[0]));
+#else
+  return hn::Combine(kIntegers, hn::DemoteTo(kHalfIntegers, function(v.parts[1])),
+                     hn::DemoteTo(kHalfIntegers, function(v.parts[0])));
+#endif
+}
+HWY_INLINE Wide operator*(const Wide& a, const Wide& b) {
+  Wide product;
+  for (std::size_t i = 0; i < Wide::kParts; ++i) product.parts[i] = hn::Mul(a.parts[i], b.parts[i]);
+  return product;
+}
+HWY_INLINE Wide operator-(const Wide& a, const Wide& b) {
+  Wide difference;
+  for (std::size_t i = 0; i < Wide::kParts; ++i) difference.parts[i] = hn::Sub(a.parts[i], b.parts[i]);
+  return difference;
+}
+
+/// Cut to [-limit, limit].
+HWY_INLINE Double cut(Double v, double limit) {
+  const Double most = hn::Set(kDoubles, limit);
+  return hn::Max(hn::Min(v, most), hn::Neg(most));
+}
+
+/// Set-up of a vector of triangles for a tile.
+class TileSetup {
+ public:
+  /// Corners in 1/256 px from the tile's first sample.
+  HWY_INLINE TileSetup(IntegerMask lanes, const LaneCorner (&corners)[3], FillRule fill) {
+    const auto magnitude = [](Integer a, Integer b) HWY_ATTR { return hn::Max(hn::Abs(a), hn::Abs(b)); };
+    const LaneCorner &a = corners[0], &b = corners[1], &c = corners[2];
+    const Integer extent_x = hn::Sub(hn::Max(hn::Max(a.x, b.x), c.x), hn::Min(hn::Min(a.x, b.x), c.x));
+    const Integer extent_y = hn::Sub(hn::Max(hn::Max(a.y, b.y), c.y), hn::Min(hn::Min(a.y, b.y), c.y));
+    const Integer farthest = hn::Max(hn::Max(magnitude(a.x, a.y), magnitude(b.x, b.y)), magnitude(c.x, c.y));
+    const Integer extent = hn::Max(extent_x, extent_y);
+    // Differences below 2^14 times coordinates below 2^15: two such products and their difference fit.
+    const IntegerMask is_near = hn::And(hn::Lt(extent, integer(1 << 14)), hn::Lt(farthest, integer(1 << 15)));
+    in_reach = hn::Lt(extent, integer(kReach));
+    if (hn::AllFalse(kIntegers, hn::AndNot(is_near, lanes)))
+      edges_near(corners, fill);
+    else
+      edges_far(corners, fill);
+  }
+
+  Integer value[3], per_column[3], per_row[3];
+  IntegerMask has_area;
+  /// Whether edges do not overflow in 32 bits within a tile.
+  IntegerMask in_reach;
+
+ private:
+  /// |dx| + |dy| < 2^23, times a tile of 128 pixels, is below 2^30.
+  static constexpr std::int32_t kReach = 1 << 22;
+
+  /// The part of an edge that both ways share; `flip` as is_flipped().
+  HWY_INLINE void direct(int e, const LaneCorner (&c)[3], IntegerMask negative) {
+    const LaneCorner &from = c[kEdgeFrom[e]], &to = c[kEdgeTo[e]];
+    const IntegerMask flip = e == 2 ? hn::Not(negative) : negative;
+    const Integer ex = hn::Sub(to.x, from.x), ey = hn::Sub(to.y, from.y);
+    per_row[e] = hn::IfThenElse(flip, hn::Neg(ex), ex);
+    per_column[e] = hn::IfThenElse(flip, ey, hn::Neg(ey));
+  }
+
+  /// 0 where samples on the edge belong to the triangle, else 1.
+  HWY_INLINE Integer least(int e, FillRule fill) const {
+    const Integer zero = hn::Zero(kIntegers);
+    if (fill == FillRule::kClosed) return zero;
+    const IntegerMask owned =
+        hn::Or(hn::Gt(per_column[e], zero), hn::And(hn::Eq(per_column[e], zero), hn::Gt(per_row[e], zero)));
+    return hn::IfThenZeroElse(owned, integer(1));
+  }
+
+  HWY_INLINE void edges_near(const LaneCorner (&c)[3], FillRule fill) {
+    const Integer area = hn::Sub(hn::Mul(hn::Sub(c[1].x, c[0].x), hn::Sub(c[2].y, c[0].y)),
+                                 hn::Mul(hn::Sub(c[1].y, c[0].y), hn::Sub(c[2].x, c[0].x)));
+    has_area = hn::Ne(area, hn::Zero(kIntegers));
+    for (int e = 0; e < 3; ++e) {
+      direct(e, c, hn::Lt(area, hn::Zero(kIntegers)));
+      const LaneCorner& from = c[kEdgeFrom[e]];
+      // dx (0 - ay) - dy (0 - ax)
+      const Integer at_origin = hn::Neg(hn::Add(hn::Mul(per_row[e], from.y), hn::Mul(per_column[e], from.x)));
+      value[e] = hn::ShiftRight<8>(hn::Sub(at_origin, least(e, fill)));
+    }
+  }
+
+  HWY_INLINE void edges_far(const LaneCorner (&c)[3], FillRule fill) {
+    const Wide area = wide(hn::Sub(c[1].x, c[0].x)) * wide(hn::Sub(c[2].y, c[0].y)) -
+                      wide(hn::Sub(c[1].y, c[0].y)) * wide(hn::Sub(c[2].x, c[0].x));
+    const Integer sign = narrow(area, [](Double v) HWY_ATTR { return cut(v, 1); });
+    has_area = hn::Ne(sign, hn::Zero(kIntegers));
+    for (int e = 0; e < 3; ++e) {
+      direct(e, c, hn::Lt(sign, hn::Zero(kIntegers)));
+      const LaneCorner& from = c[kEdgeFrom[e]];
+      const Wide at_origin = wide(hn::Neg(per_row[e])) * wide(from.y) - wide(per_column[e]) * wide(from.x) -
+                             wide(least(e, fill));
+      value[e] = narrow(at_origin, [](Double v) HWY_ATTR {
+        return cut(hn::Floor(hn::Mul(v, hn::Set(kDoubles, 0x1p-8))), 0x1p30);
+      });
+    }
+  }
+};
+
+HWY_INLINE void store(Integer v, IntegerMask mask, std::int32_t* to) {
+  hn::StoreU(hn::Compress(v, mask), kIntegers, to);
+}
+HWY_INLINE void store(Float v, IntegerMask mask, float* to) {
+  hn::StoreU(hn::Compress(v, hn::RebindMask(kFloats, mask)), kFloats, to);
+}
+
+/// Sets up what of a block reaches the tile; triangles too large for 32 bits are drawn at once.
+void set_up(const TriangleStreams::Block& block, const TileSettings& settings, TilePixels& tile,
+            TileTriangles& out) {
+  const Integer left = integer(tile.box.x0 * 256 + 128), top = integer(tile.box.y0 * 256 + 128);
+  const Integer one = integer(1), zero = hn::Zero(kIntegers);
+  for (std::int64_t first = 0; first < block.size; first += kWidth) {
+    IntegerMask draws = hn::FirstN(kIntegers, static_cast<std::size_t>(block.size - first));
+    const auto field = [&](int f) HWY_ATTR { return hn::LoadU(kCodes, block.fields[f] + first); };
+    LaneCorner corners[3];
+    for (int i = 0; i < 3; ++i)
+      corners[i] = {snapped(hn::BitCast(kFloats, field(i))), snapped(hn::BitCast(kFloats, field(3 + i))),
+                    hn::BitCast(kFloats, field(6 + i))};
+    sort_corners(corners);
+    const LanePlane plane = depth_plane(corners);
+    for (LaneCorner& corner : corners) {
+      corner.x = hn::Sub(corner.x, left);
+      corner.y = hn::Sub(corner.y, top);
+    }
+    const TileSetup setup(draws, corners, settings.fill);
+    const auto least = [](Integer a, Integer b, Integer c) HWY_ATTR { return hn::Min(hn::Min(a, b), c); };
+    const auto most = [](Integer a, Integer b, Integer c) HWY_ATTR { return hn::Max(hn::Max(a, b), c); };
+    const auto first_at = [](Integer v) HWY_ATTR { return hn::ShiftRight<8>(hn::Add(v, integer(255))); };
+    const auto end_at = [](Integer v) HWY_ATTR { return hn::Add(hn::ShiftRight<8>(v), integer(1)); };
+    const LaneBox box = within({first_at(least(corners[0].x, corners[1].x, corners[2].x)),
+                                first_at(least(corners[0].y, corners[1].y, corners[2].y)),
+                                end_at(most(corners[0].x, corners[1].x, corners[2].x)),
+                                end_at(most(corners[0].y, corners[1].y, corners[2].y))},
+                               tile.width(), tile.height());
+    draws = hn::And(hn::And(draws, setup.has_area), box.holds_a_sample());
+    for (std::uint32_t far = bits_of(hn::AndNot(setup.in_reach, draws)); far != 0; far &= far - 1)
+      draw_one_by_one<Fixed8>(
+          block, static_cast<std::size_t>(first) + static_cast<std::size_t>(std::countr_zero(far)),
+          {settings.fill, settings.grid.width, settings.grid.height}, tile);
+    draws = hn::And(draws, setup.in_reach);
+
+    const Integer last_x = hn::Sub(box.x1, one), last_y = hn::Sub(box.y1, one);
+    Integer partial = zero;
+    for (int e = 0; e < 3; ++e) {
+      const Integer at_x0 = hn::Mul(setup.per_column[e], box.x0),
+                    at_x1 = hn::Mul(setup.per_column[e], last_x);
+      const Integer at_y0 = hn::Mul(setup.per_row[e], box.y0), at_y1 = hn::Mul(setup.per_row[e], last_y);
+      const Integer largest = hn::Add(setup.value[e], hn::Add(hn::Max(at_x0, at_x1), hn::Max(at_y0, at_y1)));
+      const Integer smallest = hn::Add(setup.value[e], hn::Add(hn::Min(at_x0, at_x1), hn::Min(at_y0, at_y1)));
+      draws = hn::AndNot(hn::Lt(largest, zero), draws);
+      partial = hn::Or(partial, hn::IfThenElseZero(hn::Lt(smallest, zero), integer(1 << e)));
+    }
+    if (hn::AllFalse(kIntegers, draws)) continue;
+
+    // Each operation of the depth rounds monotonically: the smallest of a box is that of a corner.
+    const auto nearer_end = [&](Float gradient, Integer low, Integer high) HWY_ATTR {
+      const auto rises = hn::RebindMask(kIntegers, hn::Gt(gradient, hn::Zero(kFloats)));
+      return hn::IfThenElse(rises, low, hn::Sub(high, one));
+    };
+    const Integer near_x = hn::Add(nearer_end(plane.gx, box.x0, box.x1), integer(tile.box.x0));
+    const Integer near_y = hn::Add(nearer_end(plane.gy, box.y0, box.y1), integer(tile.box.y0));
+    const Float nearest = depth_at(plane, depth_of_row(plane, sample_of(near_y)), sample_of(near_x));
+
+    const std::size_t end = out.size;
+    for (int e = 0; e < 3; ++e) {
+      store(setup.value[e], draws, out.value[e] + end);
+      store(setup.per_column[e], draws, out.per_column[e] + end);
+      store(setup.per_row[e], draws, out.per_row[e] + end);
+    }
+    store(partial, draws, out.partial + end);
+    store(box.x0, draws, out.x0 + end);
+    store(box.y0, draws, out.y0 + end);
+    store(box.x1, draws, out.x1 + end);
+    store(box.y1, draws, out.y1 + end);
+    store(plane.d0, draws, out.d0 + end);
+    store(plane.gx, draws, out.gx + end);
+    store(plane.gy, draws, out.gy + end);
+    store(plane.low, draws, out.low + end);
+    store(plane.high, draws, out.high + end);
+    store(plane.x0, draws, out.px + end);
+    store(plane.y0, draws, out.py + end);
+    store(nearest, draws, out.nearest + end);
+    store(hn::BitCast(kIntegers, field(9)), draws, out.ranks + end);
+    out.size += hn::CountTrue(kIntegers, draws);
+  }
+}
+
+/// Keeps the fragments of `inside` whose keys are smaller than those of the pixels.
+HWY_INLINE void keep(IntegerMask inside, Float depth, Integer rank, float* depths, std::int32_t* ranks) {
+  const Float old_depth = hn::LoadU(kFloats, depths);
+  const Integer old_rank = hn::LoadU(kIntegers, ranks);
+  const IntegerMask nearer = hn::RebindMask(kIntegers, hn::Lt(depth, old_depth));
+  const IntegerMask tied =
+      hn::And(hn::RebindMask(kIntegers, hn::Eq(depth, old_depth)), hn::Lt(rank, old_rank));
+  const IntegerMask kept = hn::And(inside, hn::Or(nearer, tied));
+  hn::BlendedStore(depth, hn::RebindMask(kFloats, kept), kFloats, depths);
+  hn::BlendedStore(rank, kept, kIntegers, ranks);
+}
+
+/// Draws triangle i, whose box is cut by the edges `cutting`; the others need no look.
+template <int kEdges>
+HWY_INLINE void draw_triangle(const TileTriangles& t, std::size_t i, const int (&cutting)[3],
+                              const TilePixels& tile) {
+  const std::int32_t x1 = t.x1[i], y0 = t.y0[i], y1 = t.y1[i];
+  const float d0 = t.d0[i], gy = t.gy[i], py = t.py[i];
+  const Float gx = hn::Set(kFloats, t.gx[i]), px = hn::Set(kFloats, t.px[i]);
+  const Float low = hn::Set(kFloats, t.low[i]), high = hn::Set(kFloats, t.high[i]);
+  const Integer rank = integer(t.ranks[i]);
+  for (std::int32_t x = t.x0[i]; x < x1; x += kWidth) {
+    const Integer columns = hn::Iota(kIntegers, x);
+    Integer value[3], per_row[3];
+    for (int k = 0; k < kEdges; ++k) {
+      const int e = cutting[k];
+      per_row[k] = integer(t.per_row[e][i]);
+      value[k] = hn::Add(integer(t.value[e][i] + t.per_row[e][i] * y0),
+                         hn::Mul(integer(t.per_column[e][i]), columns));
+    }
+    const Float of_columns = hn::Mul(gx, hn::Sub(sample_of(hn::Add(columns, integer(tile.box.x0))), px));
+    const IntegerMask in_box = hn::Lt(columns, integer(x1));
+    for (std::int32_t y = y0; y < y1; ++y) {
+      IntegerMask inside = in_box;
+      if constexpr (kEdges > 0) {
+        Integer signs = value[0];
+        for (int k = 1; k < kEdges; ++k) signs = hn::Or(signs, value[k]);
+        inside = hn::And(inside, hn::Gt(signs, integer(-1)));
+        for (int k = 0; k < kEdges; ++k) value[k] = hn::Add(value[k], per_row[k]);
+        if (hn::AllFalse(kIntegers, inside)) continue;
+      }
+      const float of_row = d0 + gy * ((static_cast<float>(tile.box.y0 + y) + 0.5f) - py);
+      const Float depth = clamped(hn::Add(hn::Set(kFloats, of_row), of_columns), low, high);
+      keep(inside, depth, rank, tile.depths + y * tile.pitch + x, tile.ranks + y * tile.pitch + x);
+    }
+  }
+}
+
+void draw_triangle(const TileTriangles& t, std::size_t i, const TilePixels& tile) {
+  int cutting[3] = {}, edges = 0;
+  for (int e = 0; e < 3; ++e)
+    if (t.partial[i] >> e & 1) cutting[edges++] = e;
+  switch (edges) {
+    case 0:
+      return draw_triangle<0>(t, i, cutting, tile);
+    case 1:
+      return draw_triangle<1>(t, i, cutting, tile);
+    case 2:
+      return draw_triangle<2>(t, i, cutting, tile);
+    default:
+      return draw_triangle<3>(t, i, cutting, tile);
+  }
+}
+
+/// The largest depth of a tile: what is farther everywhere is hidden.
+float farthest_depth(const TilePixels& tile) {
+  Float most = hn::Set(kFloats, -std::numeric_limits<float>::infinity());
+  for (std::int32_t y = 0; y < tile.height(); ++y)
+    for (std::int32_t x = 0; x < tile.width(); x += kWidth)
+      most = hn::Max(most, hn::LoadU(kFloats, tile.depths + y * tile.pitch + x));
+  return hn::GetLane(hn::MaxOfLanes(kFloats, most));
+}
+
+/// Draws the triangles that are set up and empties their list.
+void draw_triangles(TileTriangles& triangles, bool front_to_back, TilePixels& tile,
+                    std::vector<std::uint64_t>& order) {
+  if (!front_to_back) {
+    for (std::size_t i = 0; i < triangles.size; ++i) draw_triangle(triangles, i, tile);
+    triangles.size = 0;
+    return;
+  }
+  const std::int64_t area = std::int64_t{tile.width()} * tile.height();
+  const auto box_area = [&](std::size_t i) {
+    return (triangles.x1[i] - triangles.x0[i]) * (triangles.y1[i] - triangles.y0[i]);
+  };
+  // Triangles of few pixels hide nothing and cost less than to be sorted.
+  constexpr std::int32_t kLarge = 256;  // pixels of the box
+  order.clear();
+  for (std::size_t i = 0; i < triangles.size; ++i)
+    if (box_area(i) >= kLarge)
+      order.push_back(std::uint64_t{rasterbench::encode(triangles.nearest[i])} << 32 | i);
+  std::sort(order.begin(), order.end());
+  // What was drawn since then has at most lowered it. A look at every pixel is worth it once as many were
+  // drawn.
+  float farthest = std::numeric_limits<float>::infinity();
+  std::int64_t drawn = 0;
+  const auto draw = [&](std::size_t i) {
+    if (triangles.nearest[i] > farthest) return;
+    draw_triangle(triangles, i, tile);
+    drawn += box_area(i);
+    if (drawn < area) return;
+    farthest = farthest_depth(tile);
+    drawn = 0;
+  };
+  for (const std::uint64_t entry : order) draw(static_cast<std::uint32_t>(entry));
+  for (std::size_t i = 0; i < triangles.size; ++i)
+    if (box_area(i) < kLarge) draw(i);
+  triangles.size = 0;
+}
+
+/// Copies n elements past the caches; `to` need not be aligned.
+template <class T>
+void stream_row(const T* from, std::int32_t n, T* to) {
+  constexpr hn::ScalableTag<T> d;
+  constexpr auto lanes = static_cast<std::int32_t>(hn::MaxLanes(d));
+  std::int32_t i = 0;
+  for (; i < n && (reinterpret_cast<std::uintptr_t>(to + i) % (sizeof(T) * hn::MaxLanes(d))) != 0; ++i)
+    to[i] = from[i];
+  for (; i + lanes <= n; i += lanes) hn::Stream(hn::LoadU(d, from + i), d, to + i);
+  for (; i < n; ++i) to[i] = from[i];
+}
+
+/// Tile -> picture.
+void resolve(const TilePixels& tile, const TileSettings& settings, TileScratch& scratch,
+             const TileOutput& output) {
+  const auto& triangles = output.scene.model.triangles;
+  const std::uint32_t background = pack_rgba(output.scene.parameters.background);
+  const std::int32_t width = tile.width();
+  const auto count = settings.triangle_count;
+  // First the ids of all runs, to be fetched and shaded together.
+  auto &heads = scratch.heads, &ids = scratch.ids, &colours = scratch.colours;
+  heads.clear();
+  ids.clear();
+  for (std::int32_t y = 0; y < tile.height(); ++y) {
+    const std::int32_t* ranks = tile.ranks + y * tile.pitch;
+    for (std::int32_t x = 0; x < width; ++x) {
+      if (x > 0 && ranks[x] == ranks[x - 1]) continue;
+      heads.push_back(static_cast<std::uint32_t>(x));
+      if (ranks[x] == kNoRank) continue;
+      ids.push_back(swap_rank(settings.tie, count, static_cast<std::uint32_t>(ranks[x])));
+      __builtin_prefetch(&triangles[ids.back()]);
+    }
+    heads.push_back(static_cast<std::uint32_t>(width));
+  }
+  colours.resize(ids.size());
+  shade_in_lanes(triangles, ids, output.scene.parameters.object, colours.data(), scratch.isa);
+
+  constexpr std::int32_t kWidest = 128;
+  alignas(64) std::uint32_t row_colours[kWidest + kLanes];
+  alignas(64) float row_depths[kWidest + kLanes];
+  const std::uint32_t* head = heads.data();
+  const std::uint32_t* colour = colours.data();
+  for (std::int32_t y = 0; y < tile.height(); ++y) {
+    const std::int32_t* ranks = tile.ranks + y * tile.pitch;
+    const float* depths = tile.depths + y * tile.pitch;
+    for (; static_cast<std::int32_t>(*head) < width; ++head) {
+      const auto v = hn::Set(kCodes, ranks[*head] == kNoRank ? background : *colour++);
+      for (std::uint32_t x = *head; x < head[1]; x += kLanes) hn::StoreU(v, kCodes, row_colours + x);
+    }
+    ++head;
+    for (std::int32_t x = 0; x < width; x += kWidth) {
+      const auto empty = hn::RebindMask(kFloats, hn::Eq(hn::LoadU(kIntegers, ranks + x), integer(kNoRank)));
+      // Zero added, -0 becomes +0, as in the keys of the mode.
+      const Float depth = hn::Add(hn::LoadU(kFloats, depths + x), hn::Zero(kFloats));
+      hn::StoreU(hn::IfThenElse(empty, hn::Set(kFloats, 1.0f), depth), kFloats, row_depths + x);
+    }
+    const std::int64_t at = std::int64_t{tile.box.y0 + y} * settings.grid.width + tile.box.x0;
+    if (settings.techniques.streaming) {
+      stream_row(row_colours, width, output.colours + at);
+      stream_row(row_depths, width, output.depths + at);
+    } else {
+      std::copy_n(row_colours, width, output.colours + at);
+      std::copy_n(row_depths, width, output.depths + at);
+    }
+    if (output.ids != nullptr)
+      for (std::int32_t x = 0; x < width; ++x)
+        output.ids[at + x] = ranks[x] == kNoRank
+                                 ? -1
+                                 : static_cast<std::int32_t>(
+                                       swap_rank(settings.tie, count, static_cast<std::uint32_t>(ranks[x])));
+  }
+}
+
+void draw(const TileTask& task, const TileSettings& settings, TileScratch& scratch,
+          const TileOutput& output) {
+  TilePixels tile{scratch.depths.data(), scratch.ranks.data(), settings.grid.pitch(),
+                  settings.grid.box(task.tile)};
+  clear(tile, settings.grid.side());
+  if (!task.first_round) load(tile, settings.grid.width, task.kept_depths, task.kept_ranks);
+  TileTriangles& triangles = scratch.triangles;
+  for (const FrontEnd* front_end : task.front_ends)
+    for (auto block = front_end->triangles.blocks(task.tile); block != nullptr; block = block->next) {
+      set_up(*block, settings, tile, triangles);
+      if (triangles.size >= TileTriangles::kSize)
+        draw_triangles(triangles, settings.techniques.front_to_back, tile, scratch.order);
+    }
+  draw_triangles(triangles, settings.techniques.front_to_back, tile, scratch.order);
+  for (const FrontEnd* front_end : task.front_ends)
+    for (auto block = front_end->fragments.blocks(task.tile); block != nullptr; block = block->next)
+      for (std::int64_t i = 0; i < block->size; ++i)
+        tile.keep(block->fields[2][i], as_float(block->fields[0][i]),
+                  static_cast<std::int32_t>(block->fields[1][i]));
+  if (task.last_round) {
+    resolve(tile, settings, scratch, output);
+    hwy::FlushStream();
+  } else {
+    save(tile, settings.grid.width, task.kept_depths, task.kept_ranks);
+  }
+}
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace rasterbench
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace rasterbench {
+namespace {
+
+HWY_EXPORT(select);
+HWY_EXPORT(distribute);
+HWY_EXPORT(draw);
+
+TileLanes compiled_for(Isa isa) {
+  if (isa == Isa::kBaseline)  // vectors of one lane
+    return {HWY_STATIC_DISPATCH(select), HWY_STATIC_DISPATCH(distribute), HWY_STATIC_DISPATCH(draw)};
+  const std::size_t index = dispatch_index(isa);
+  return {HWY_DISPATCH_TABLE(select)[index], HWY_DISPATCH_TABLE(distribute)[index],
+          HWY_DISPATCH_TABLE(draw)[index]};
+}
+
+}  // namespace
+
+const TileLanes& tile_lanes(Isa isa) {
+  static const TileLanes compiled[] = {compiled_for(Isa::kBaseline), compiled_for(Isa::kSse4),
+                                       compiled_for(Isa::kAvx2), compiled_for(Isa::kAvx512)};
+  return compiled[static_cast<std::size_t>(isa)];
+}
+
+}  // namespace rasterbench
+#endif  // HWY_ONCE

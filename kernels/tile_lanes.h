@@ -1,0 +1,133 @@
+// The two halves of fused_tiles in vectors: from screen triangles to the streams of the tiles, and from the
+// streams of a tile to its pixels. Mode fixed_8, with the bits of its scalar specification.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/isa.h"
+#include "kernels/tile_streams.h"
+#include "pipeline/frame.h"
+#include "pipeline/screen_batch.h"
+
+namespace rasterbench {
+
+/// The square tiles of an image; their side is a power of two, so that shifts find the tile of a pixel.
+struct TileGrid {
+  int width = 0, height = 0;  ///< of the image, in pixels
+  int shift = 6;              ///< log2 of the side
+  std::int64_t columns = 0, rows = 0;
+
+  TileGrid() = default;
+  TileGrid(int image_width, int image_height, int side_log2)
+      : width(image_width),
+        height(image_height),
+        shift(side_log2),
+        columns((image_width + side() - 1) >> side_log2),
+        rows((image_height + side() - 1) >> side_log2) {}
+
+  int side() const { return 1 << shift; }
+  /// Of a row of a tile in memory: vectors may read and write beyond its end.
+  int pitch() const { return side() + 16; }
+  std::int64_t tiles() const { return columns * rows; }
+  PixelBox box(std::int64_t tile) const {
+    const auto x = static_cast<std::int32_t>(tile % columns) << shift;
+    const auto y = static_cast<std::int32_t>(tile / columns) << shift;
+    return intersect({0, 0, width, height}, {x, y, x + side(), y + side()});
+  }
+};
+
+/// Fields of a fragment: depth, rank, and its place in the tile, row * pitch + column.
+using FragmentStreams = TileStreams<3>;
+/// Fields of a triangle: x, y and d of three corners as ScreenTriangle has them, rank.
+using TriangleStreams = TileStreams<10>;
+
+/// How one frame is drawn.
+struct TileSettings {
+  TileGrid grid;
+  FillRule fill = FillRule::kClosed;
+  TieRule tie = TieRule::kFirst;
+  std::int64_t triangle_count = 0;  ///< of the scene: for swap_rank()
+  Techniques techniques;
+};
+
+/// What the front end of one worker fills, and what it uses meanwhile.
+struct FrontEnd {
+  FragmentStreams fragments;
+  TriangleStreams triangles;
+
+  /// Triangles of a batch whose boxes hold a sample of the image.
+  struct Survivors {
+    static constexpr std::size_t kSize = ScreenBatch<float>::kSize + TriangleStreams::kOverhang;
+    alignas(64) float x[3][kSize], y[3][kSize], d[3][kSize];
+    alignas(64) std::int32_t ranks[kSize];
+    std::int64_t size;
+    std::int64_t tiles;  ///< that their boxes touch, summed
+  } survivors;
+};
+
+/// Triangles of a tile, set up: x and y count from the tile's first pixel. Each row is one quantity.
+struct TileTriangles {
+  static constexpr std::size_t kSize = 256;
+  static constexpr std::size_t kRoom = kSize + TriangleStreams::kCapacity + TriangleStreams::kOverhang;
+
+  /// Edge e at pixel (x, y): value + per_column x + per_row y >= 0 inside.
+  alignas(64) std::int32_t value[3][kRoom], per_column[3][kRoom], per_row[3][kRoom];
+  alignas(64) std::int32_t partial[kRoom];  ///< bit e: edge e has samples of the box on both sides
+  alignas(64) std::int32_t x0[kRoom], y0[kRoom], x1[kRoom], y1[kRoom];  ///< the box within the tile
+  alignas(64) float d0[kRoom], gx[kRoom], gy[kRoom], low[kRoom], high[kRoom], px[kRoom], py[kRoom];
+  alignas(64) float nearest[kRoom];  ///< smallest depth of a sample of the box
+  alignas(64) std::int32_t ranks[kRoom];
+  std::size_t size = 0;
+};
+
+/// What the drawing of a tile needs; one for each worker.
+struct TileScratch {
+  explicit TileScratch(const TileGrid& grid)
+      : depths(static_cast<std::size_t>(grid.side()) * static_cast<std::size_t>(grid.pitch()), "a tile"),
+        ranks(depths.size(), "a tile") {}
+
+  Buffer<float> depths;        ///< side x pitch; -inf where no pixel of the image is
+  Buffer<std::int32_t> ranks;  ///< kNoRank: nothing there yet
+  TileTriangles triangles;
+  Isa isa = Isa::kBaseline;
+  std::vector<std::uint64_t> order;                ///< of the large triangles: nearest depth, index
+  std::vector<std::uint32_t> heads, ids, colours;  ///< of the runs of pixels that show one triangle
+};
+
+inline constexpr std::int32_t kNoRank = 0x7fffffff;  ///< above every rank: T <= 2^31 - 1
+
+/// One tile, from streams to the picture.
+struct TileTask {
+  std::int64_t tile;
+  std::span<const FrontEnd* const> front_ends;  ///< one for each worker
+  /// Depths and ranks of the whole image between the rounds of a frame, or null: see fused_tiles.cpp.
+  float* kept_depths;
+  std::int32_t* kept_ranks;
+  bool first_round, last_round;
+};
+
+/// Where the picture goes.
+struct TileOutput {
+  const Scene& scene;
+  std::uint32_t* colours;
+  float* depths;
+  std::int32_t* ids;  ///< null: nobody asks for them
+};
+
+/// One compilation of the loops.
+struct TileLanes {
+  /// Fills front_end.survivors.
+  void (*select)(const ScreenBatch<float>& batch, const TileSettings& settings, FrontEnd& front_end);
+  /// Appends the survivors to the streams, which have room for them.
+  void (*distribute)(const TileSettings& settings, FrontEnd& front_end);
+  /// Draws a tile.
+  void (*draw)(const TileTask& task, const TileSettings& settings, TileScratch& scratch,
+               const TileOutput& output);
+};
+
+/// The loops for an instruction set that this CPU has.
+const TileLanes& tile_lanes(Isa isa);
+
+}  // namespace rasterbench

@@ -1,0 +1,91 @@
+// What a front end hands to the tiles: per tile a stream of entries of some 32-bit fields, in blocks that a
+// vector can be stored into. Each worker fills streams of its own; whoever draws a tile reads those of all
+// workers. No atomics, and since the smallest key wins, the order does not matter.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "base/buffer.h"
+
+namespace rasterbench {
+
+/// The streams of one worker, one for each tile. Blocks come from an arena that is kept between frames, so
+/// that a frame allocates nothing; a caller makes sure of the room beforehand (spare_blocks, grow).
+template <int kFields>
+class TileStreams {
+ public:
+  static constexpr int kCapacity = 64;  ///< entries a block
+  static constexpr int kOverhang = 16;  ///< entries of the widest vector: what a store may write at once
+
+  struct Block {
+    alignas(64) std::uint32_t fields[kFields][kCapacity];
+    std::int64_t size;
+    const Block* next;  ///< an older block of the same tile, or null
+  };
+
+  /// Empties the streams of `tiles` tiles.
+  void reset(std::int64_t tiles) {
+    last_.assign(static_cast<std::size_t>(tiles), nullptr);
+    used_ = 0;
+  }
+
+  /// The newest block of a tile's stream, null where it is empty.
+  const Block* blocks(std::int64_t tile) const { return last_[static_cast<std::size_t>(tile)]; }
+
+  /// The block of `tile` that has room for kOverhang entries more. Needs a spare block.
+  Block& room(std::int64_t tile) {
+    Block*& last = last_[static_cast<std::size_t>(tile)];
+    if (last == nullptr || last->size > kCapacity - kOverhang) {
+      Block& block = take();
+      block.size = 0;
+      block.next = last;
+      last = &block;
+    }
+    return *last;
+  }
+
+  std::int64_t used_blocks() const { return used_; }
+  /// Blocks that room() can still take.
+  std::int64_t spare_blocks() const { return capacity_ - used_; }
+
+  /// Makes at least `blocks` spare. Throws InputError where the memory is not there.
+  void grow(std::int64_t blocks) {
+    while (spare_blocks() < blocks) {
+      const std::int64_t more = std::max(blocks - spare_blocks(), kChunk);
+      chunks_.push_back(
+          {Buffer<Block>(static_cast<std::size_t>(more), "the entries of the tiles"), capacity_});
+      capacity_ += more;
+    }
+  }
+
+  std::size_t bytes() const {
+    return static_cast<std::size_t>(capacity_) * sizeof(Block) + last_.size() * sizeof(last_[0]);
+  }
+  static constexpr std::size_t kBlockBytes = sizeof(Block);
+
+ private:
+  static constexpr std::int64_t kChunk = 512;  // blocks allocated at once
+
+  struct Chunk {
+    Buffer<Block> blocks;
+    std::int64_t first;  // number of its first block
+  };
+
+  Block& take() {
+    while (chunk_ > 0 && used_ < chunks_[chunk_].first) --chunk_;  // after a reset
+    while (used_ >= chunks_[chunk_].first + static_cast<std::int64_t>(chunks_[chunk_].blocks.size()))
+      ++chunk_;
+    Chunk& chunk = chunks_[chunk_];
+    return chunk.blocks[static_cast<std::size_t>(used_++ - chunk.first)];
+  }
+
+  std::vector<Block*> last_;   // per tile
+  std::vector<Chunk> chunks_;  // blocks never move: streams point at them
+  std::size_t chunk_ = 0;      // the chunk of block `used_`
+  std::int64_t used_ = 0, capacity_ = 0;
+};
+
+}  // namespace rasterbench
