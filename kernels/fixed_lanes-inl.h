@@ -42,11 +42,10 @@ HWY_INLINE hn::Vec<hn::RebindToUnsigned<D>> encode(D d, V depth) {
   return hn::Xor(bits, hn::Or(sign, hn::Set(du, 0x80000000u)));
 }
 
-/// The clamp of DepthPlane.
+/// The clamp of DepthPlane: of a NaN, Max gives its second argument.
 template <class V>
 HWY_INLINE V clamped(V depth, V low, V high) {
-  const V raised = hn::IfThenElse(hn::Gt(depth, low), depth, low);
-  return hn::IfThenElse(hn::Lt(raised, high), raised, high);
+  return hn::Min(hn::Max(depth, low), high);
 }
 
 /// A coordinate in 1/256 px, to the nearest, ties to even.

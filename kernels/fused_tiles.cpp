@@ -101,8 +101,8 @@ class FusedTiles final : public Renderer {
   std::size_t bytes() const override {
     std::size_t sum = colours_.bytes() + depths_.bytes() + kept_depths_.bytes() + kept_ranks_.bytes();
     for (const auto& worker : workers_)
-      sum += sizeof(Worker) + worker->front_end.fragments.bytes() + worker->front_end.triangles.bytes() +
-             worker->scratch.depths.bytes() + worker->scratch.ranks.bytes();
+      sum += sizeof(Worker) + worker->front_end.bytes() + worker->scratch.depths.bytes() +
+             worker->scratch.ranks.bytes();
     return sum;
   }
 
@@ -123,8 +123,7 @@ class FusedTiles final : public Renderer {
     TileScratch scratch;
     ScreenBatch<float> screen;
     std::vector<ScreenTriangle<float>> extra;  ///< further pieces of clipped triangles
-    /// Spare blocks that were missing, of each kind; 0: none.
-    std::int64_t missing_fragment_blocks = 0, missing_triangle_blocks = 0;
+    bool is_full = false;                      ///< its survivors found no room in the streams
   };
 
   static const FrameSettings& checked(const FrameSettings& settings) {
@@ -142,10 +141,7 @@ class FusedTiles final : public Renderer {
 
   /// Transforms batches into the streams until all are done or no room is left; whether all are.
   bool fill_streams() {
-    for (const auto& worker : workers_) {
-      worker->front_end.fragments.reset(tile_settings_.grid.tiles());
-      worker->front_end.triangles.reset(tile_settings_.grid.tiles());
-    }
+    for (const auto& worker : workers_) worker->front_end.reset(tile_settings_.grid.tiles());
     const ScreenTransform transform = make_screen_transform(camera_, Fixed8::kDepthFunction);
     for (;;) {
       std::atomic<bool> all_done = true;
@@ -163,7 +159,7 @@ class FusedTiles final : public Renderer {
   bool fill(std::size_t number, const ScreenTransform& transform, Worker& worker) {
     Batch& batch = batches_[number];
     if (batch.done) return true;
-    if (worker.missing_triangle_blocks + worker.missing_fragment_blocks > 0) return false;
+    if (worker.is_full) return false;
     const std::size_t first = number * kBatch;
     worker.extra.clear();
     batch.counts = {};
@@ -184,19 +180,11 @@ class FusedTiles final : public Renderer {
     return true;
   }
 
-  bool append(ScreenBatch<float>& screen, Worker& worker) {
-    FrontEnd& front_end = worker.front_end;
-    lanes_.select(screen, tile_settings_, front_end);
-    // A vector of fragments may need a new block each time it is stored, a triangle one in every tile.
-    const std::int64_t fragment_blocks = 4 * front_end.survivors.size;
-    if (front_end.fragments.spare_blocks() < fragment_blocks ||
-        front_end.triangles.spare_blocks() < front_end.survivors.tiles) {
-      worker.missing_fragment_blocks = fragment_blocks;
-      worker.missing_triangle_blocks = front_end.survivors.tiles;
-      return false;
-    }
-    lanes_.distribute(tile_settings_, front_end);
-    return true;
+  bool append(const ScreenBatch<float>& screen, Worker& worker) {
+    lanes_.select(screen, tile_settings_, worker.front_end);
+    worker.is_full = !worker.front_end.has_room();
+    if (!worker.is_full) lanes_.distribute(tile_settings_, worker.front_end);
+    return !worker.is_full;
   }
 
   /// Makes room for the workers that ran out of it; false where that would exceed the budget and there is
@@ -205,20 +193,13 @@ class FusedTiles final : public Renderer {
     std::size_t bytes = 0;
     bool empty = true;
     for (const auto& worker : workers_) {
-      bytes += worker->front_end.fragments.bytes() + worker->front_end.triangles.bytes();
-      empty =
-          empty && worker->front_end.fragments.used_blocks() + worker->front_end.triangles.used_blocks() == 0;
+      bytes += worker->front_end.bytes();
+      empty = empty && worker->front_end.empty();
     }
     const bool may_grow = empty || bytes < stream_budget_;
     for (const auto& worker : workers_) {
-      if (may_grow && worker->missing_fragment_blocks > 0) {
-        // Doubling, so that the first frame grows few times.
-        worker->front_end.fragments.grow(worker->missing_fragment_blocks +
-                                         (empty ? 0 : worker->front_end.fragments.used_blocks()));
-        worker->front_end.triangles.grow(worker->missing_triangle_blocks +
-                                         (empty ? 0 : worker->front_end.triangles.used_blocks()));
-      }
-      worker->missing_fragment_blocks = worker->missing_triangle_blocks = 0;
+      if (may_grow && worker->is_full) worker->front_end.grow();
+      worker->is_full = false;
     }
     return may_grow;
   }

@@ -39,15 +39,16 @@ struct TilePixels {
 
   /// Keeps a fragment if its key is smaller.
   void keep(std::int64_t place, float depth, std::int32_t rank) {
-    if (depth < depths[place] || (depth == depths[place] && rank < ranks[place])) {
-      depths[place] = depth;
-      ranks[place] = rank;
-    }
+    const float old_depth = depths[place];
+    const std::int32_t old_rank = ranks[place];
+    const bool kept = (depth < old_depth) | ((depth == old_depth) & (rank < old_rank));
+    depths[place] = kept ? depth : old_depth;
+    ranks[place] = kept ? rank : old_rank;
   }
 };
 
-void clear(TilePixels& tile, int side) {
-  for (int y = 0; y < side; ++y) {
+void clear(TilePixels& tile, int rows) {
+  for (int y = 0; y < rows; ++y) {
     float* depths = tile.depths + y * tile.pitch;
     const std::int32_t inside = y < tile.height() ? tile.width() : 0;
     std::fill_n(depths, inside, kClearDepth);
@@ -212,6 +213,9 @@ void select(const ScreenBatch<float>& in, const TileSettings& settings, FrontEnd
   for (const std::int32_t sum : sums) out.tiles += sum;
 }
 
+/// Side in pixels of the boxes of small triangles.
+constexpr int kSmallSide = 4;
+
 /// The samples of a vector of tiny triangles: boxes of at most 2 x 2 pixels, each within one tile.
 struct TinySamples {
   static constexpr int kSide = 2, kPlaces = kSide * kSide;
@@ -220,8 +224,8 @@ struct TinySamples {
   Integer places[kPlaces];  ///< in the tile
 };
 
-HWY_INLINE TinySamples sample_tiny(const LaneCorner (&unsorted)[3], const LaneBox& box,
-                                   const TileGrid& grid, FillRule fill) {
+HWY_INLINE TinySamples sample_tiny(const LaneCorner (&unsorted)[3], const LaneBox& box, const TileGrid& grid,
+                                   FillRule fill) {
   LaneCorner corners[3] = {unsorted[0], unsorted[1], unsorted[2]};
   sort_corners(corners);
   SmallEdges edges = small_edges(corners, box.x0, box.y0, fill);
@@ -294,41 +298,41 @@ void distribute(const TileSettings& settings, FrontEnd& front_end) {
     const Integer tiles =
         hn::Add(hn::Mul(corner.y0, integer(static_cast<std::int32_t>(grid.columns))), corner.x0);
 
-    IntegerMask rest = in_one;
-    if (settings.techniques.fragments) {
-      const auto at_most_2 = [](Integer low, Integer high) HWY_ATTR {
-        return hn::Lt(hn::Sub(high, low), integer(TinySamples::kSide + 1));
-      };
-      const IntegerMask tiny =
-          hn::And(in_one, hn::And(at_most_2(whole.x0, whole.x1), at_most_2(whole.y0, whole.y1)));
-      if (!hn::AllFalse(kIntegers, tiny)) {
-        const TinySamples samples = sample_tiny(corners, box, grid, settings.fill);
-        IntegerMask any = hn::And(tiny, samples.covered[0]);
-        for (int i = 1; i < TinySamples::kPlaces; ++i) any = hn::Or(any, hn::And(tiny, samples.covered[i]));
-        for_each_tile(any, tiles, [&](std::int32_t tile, IntegerMask here) HWY_ATTR {
-          for (int i = 0; i < TinySamples::kPlaces; ++i) {
-            const IntegerMask mask = hn::And(here, samples.covered[i]);
-            if (hn::AllFalse(kIntegers, mask)) continue;
-            FragmentStreams::Block& block = front_end.fragments.room(tile);
-            append(samples.depths[i], mask, block.fields[0] + block.size);
-            append(ranks, mask, block.fields[1] + block.size);
-            append(samples.places[i], mask, block.fields[2] + block.size);
-            block.size += static_cast<std::int64_t>(hn::CountTrue(kIntegers, mask));
-          }
-        });
-        rest = hn::AndNot(tiny, in_one);
-      }
+    const auto longest = hn::Max(hn::Sub(whole.x1, whole.x0), hn::Sub(whole.y1, whole.y0));
+    const auto at_most = [&](int side) HWY_ATTR { return hn::Lt(longest, integer(side + 1)); };
+    IntegerMask tiny = hn::FirstN(kIntegers, 0);
+    if (settings.techniques.fragments) tiny = hn::And(in_one, at_most(TinySamples::kSide));
+    if (!hn::AllFalse(kIntegers, tiny)) {
+      const TinySamples samples = sample_tiny(corners, box, grid, settings.fill);
+      IntegerMask any = hn::And(tiny, samples.covered[0]);
+      for (int i = 1; i < TinySamples::kPlaces; ++i) any = hn::Or(any, hn::And(tiny, samples.covered[i]));
+      for_each_tile(any, tiles, [&](std::int32_t tile, IntegerMask here) HWY_ATTR {
+        for (int i = 0; i < TinySamples::kPlaces; ++i) {
+          const IntegerMask mask = hn::And(here, samples.covered[i]);
+          if (hn::AllFalse(kIntegers, mask)) continue;
+          FragmentStreams::Block& block = front_end.fragments.room(tile);
+          append(samples.depths[i], mask, block.fields[0] + block.size);
+          append(ranks, mask, block.fields[1] + block.size);
+          append(samples.places[i], mask, block.fields[2] + block.size);
+          block.size += static_cast<std::int64_t>(hn::CountTrue(kIntegers, mask));
+        }
+      });
     }
-    for_each_tile(rest, tiles, [&](std::int32_t tile, IntegerMask here) HWY_ATTR {
-      TriangleStreams::Block& block = front_end.triangles.room(tile);
-      for (int i = 0; i < 3; ++i) {
-        append(px[i], here, block.fields[i] + block.size);
-        append(py[i], here, block.fields[3 + i] + block.size);
-        append(corners[i].d, here, block.fields[6 + i] + block.size);
-      }
-      append(ranks, here, block.fields[9] + block.size);
-      block.size += static_cast<std::int64_t>(hn::CountTrue(kIntegers, here));
-    });
+    const auto append_triangles = [&](IntegerMask lanes, TriangleStreams& streams) HWY_ATTR {
+      for_each_tile(lanes, tiles, [&](std::int32_t tile, IntegerMask here) HWY_ATTR {
+        TriangleStreams::Block& block = streams.room(tile);
+        for (int i = 0; i < 3; ++i) {
+          append(px[i], here, block.fields[i] + block.size);
+          append(py[i], here, block.fields[3 + i] + block.size);
+          append(corners[i].d, here, block.fields[6 + i] + block.size);
+        }
+        append(ranks, here, block.fields[9] + block.size);
+        block.size += static_cast<std::int64_t>(hn::CountTrue(kIntegers, here));
+      });
+    };
+    const IntegerMask small = hn::AndNot(tiny, at_most(kSmallSide));
+    append_triangles(hn::And(small, in_one), front_end.small_triangles);
+    append_triangles(hn::AndNot(hn::Or(tiny, small), in_one), front_end.triangles);
     const IntegerMask in_many = hn::AndNot(in_one, valid);
     if (hn::AllFalse(kIntegers, in_many)) continue;
     alignas(64) std::int32_t x0[kLanes], y0[kLanes], x1[kLanes], y1[kLanes];
@@ -336,9 +340,82 @@ void distribute(const TileSettings& settings, FrontEnd& front_end) {
     hn::Store(box.y0, kIntegers, y0);
     hn::Store(box.x1, kIntegers, x1);
     hn::Store(box.y1, kIntegers, y1);
+    const std::uint32_t are_small = bits_of(small);
     for (std::uint32_t left = bits_of(in_many); left != 0; left &= left - 1) {
       const auto lane = static_cast<std::size_t>(std::countr_zero(left));
-      append_to_tiles(from, at + lane, {x0[lane], y0[lane], x1[lane], y1[lane]}, grid, front_end.triangles);
+      append_to_tiles(from, at + lane, {x0[lane], y0[lane], x1[lane], y1[lane]}, grid,
+                      are_small >> lane & 1 ? front_end.small_triangles : front_end.triangles);
+    }
+  }
+}
+
+/// Fetches the block that comes next: blocks lie anywhere in memory.
+template <class Block>
+HWY_INLINE void fetch_next(const Block& block) {
+  if (block.next == nullptr) return;
+  const auto* bytes = reinterpret_cast<const char*>(block.next);
+  for (std::size_t line = 0; line < sizeof(Block); line += 64) __builtin_prefetch(bytes + line);
+}
+
+/// Draws the small triangles of a block, each in a lane: one place of all boxes at a time. A sample beyond a
+/// box is outside of an edge or beyond the image, where the tile keeps nothing.
+void draw_small(const TriangleStreams::Block& block, const TileSettings& settings, TilePixels& tile) {
+  fetch_next(block);
+  for (std::int64_t first = 0; first < block.size; first += kWidth) {
+    const IntegerMask valid = hn::FirstN(kIntegers, static_cast<std::size_t>(block.size - first));
+    const auto field = [&](int f) HWY_ATTR { return hn::Load(kCodes, block.fields[f] + first); };
+    LaneCorner corners[3];
+    Integer x[3], y[3];
+    for (int i = 0; i < 3; ++i) {
+      x[i] = snapped(hn::BitCast(kFloats, field(i)));
+      y[i] = snapped(hn::BitCast(kFloats, field(3 + i)));
+      corners[i] = {x[i], y[i], hn::BitCast(kFloats, field(6 + i))};
+    }
+    const LaneBox whole = whole_box(x, y);
+    const LaneBox box = {hn::Max(whole.x0, integer(tile.box.x0)), hn::Max(whole.y0, integer(tile.box.y0)),
+                         whole.x1, whole.y1};
+    sort_corners(corners);
+    SmallEdges edges = small_edges(corners, box.x0, box.y0, settings.fill);
+    const LanePlane plane = depth_plane(corners);
+    const IntegerMask draws = hn::And(valid, edges.draws);
+    edges.value[0] =
+        hn::IfThenElse(draws, edges.value[0], integer(std::numeric_limits<std::int32_t>::min() / 2));
+    const auto most = [&](Integer v) HWY_ATTR {
+      return hn::GetLane(hn::MaxOfLanes(kIntegers, hn::IfThenElseZero(draws, v)));
+    };
+    const int columns = std::min(kSmallSide, most(hn::Sub(box.x1, box.x0)));
+    const int rows = std::min(kSmallSide, most(hn::Sub(box.y1, box.y0)));
+    const Float sample_x = sample_of(box.x0), sample_y = sample_of(box.y0);
+    Float of_column[kSmallSide];
+    for (int column = 0; column < kSmallSide; ++column)
+      of_column[column] = hn::Mul(
+          plane.gx, hn::Sub(hn::Add(sample_x, hn::Set(kFloats, static_cast<float>(column))), plane.x0));
+    alignas(64) std::int32_t places[kLanes];
+    alignas(64) std::int32_t ranks[kLanes];
+    hn::Store(hn::Add(hn::Mul(hn::Sub(box.y0, integer(tile.box.y0)),
+                              integer(static_cast<std::int32_t>(tile.pitch))),
+                      hn::Sub(box.x0, integer(tile.box.x0))),
+              kIntegers, places);
+    hn::Store(hn::BitCast(kIntegers, field(9)), kIntegers, ranks);
+    for (int row = 0; row < rows; ++row) {
+      const Float of_row = depth_of_row(plane, hn::Add(sample_y, hn::Set(kFloats, static_cast<float>(row))));
+      Integer e0 = edges.value[0], e1 = edges.value[1], e2 = edges.value[2];
+      for (int column = 0; column < columns; ++column) {
+        const IntegerMask inside = hn::Gt(hn::Or(hn::Or(e0, e1), e2), integer(-1));
+        e0 = hn::Add(e0, edges.per_column[0]);
+        e1 = hn::Add(e1, edges.per_column[1]);
+        e2 = hn::Add(e2, edges.per_column[2]);
+        std::uint32_t bits = bits_of(inside);
+        if (bits == 0) continue;
+        alignas(64) float depths[kLanes];
+        hn::Store(clamped(hn::Add(of_row, of_column[column]), plane.low, plane.high), kFloats, depths);
+        const std::int64_t step = row * tile.pitch + column;
+        for (; bits != 0; bits &= bits - 1) {
+          const auto lane = static_cast<std::size_t>(std::countr_zero(bits));
+          tile.keep(places[lane] + step, depths[lane], ranks[lane]);
+        }
+      }
+      for (int k = 0; k < 3; ++k) edges.value[k] = hn::Add(edges.value[k], edges.per_row[k]);
     }
   }
 }
@@ -470,6 +547,7 @@ HWY_INLINE void store(Float v, IntegerMask mask, float* to) {
 /// Sets up what of a block reaches the tile; triangles too large for 32 bits are drawn at once.
 void set_up(const TriangleStreams::Block& block, const TileSettings& settings, TilePixels& tile,
             TileTriangles& out) {
+  fetch_next(block);
   const Integer left = integer(tile.box.x0 * 256 + 128), top = integer(tile.box.y0 * 256 + 128);
   const Integer one = integer(1), zero = hn::Zero(kIntegers);
   for (std::int64_t first = 0; first < block.size; first += kWidth) {
@@ -677,29 +755,36 @@ void resolve(const TilePixels& tile, const TileSettings& settings, TileScratch& 
   const std::uint32_t background = pack_rgba(output.scene.parameters.background);
   const std::int32_t width = tile.width();
   const auto count = settings.triangle_count;
-  // First the ids of all runs, to be fetched and shaded together.
-  auto &heads = scratch.heads, &ids = scratch.ids, &colours = scratch.colours;
-  heads.clear();
-  ids.clear();
+  // First the ids of all runs of pixels that show one triangle, to be fetched and shaded together.
+  std::uint32_t *const heads = scratch.heads.data(), *const ids = scratch.ids.data(),
+                       *const colours = scratch.colours.data();
+  std::size_t head_count = 0, id_count = 0;
   for (std::int32_t y = 0; y < tile.height(); ++y) {
     const std::int32_t* ranks = tile.ranks + y * tile.pitch;
-    for (std::int32_t x = 0; x < width; ++x) {
-      if (x > 0 && ranks[x] == ranks[x - 1]) continue;
-      heads.push_back(static_cast<std::uint32_t>(x));
-      if (ranks[x] == kNoRank) continue;
-      ids.push_back(swap_rank(settings.tie, count, static_cast<std::uint32_t>(ranks[x])));
-      __builtin_prefetch(&triangles[ids.back()]);
+    for (std::int32_t x = 0; x < width; x += kWidth) {
+      std::uint32_t bits =
+          bits_of(hn::Ne(hn::LoadU(kIntegers, ranks + x), hn::LoadU(kIntegers, ranks + x - 1)));
+      if (x == 0) bits |= 1;
+      if (width - x < kWidth) bits &= (1u << (width - x)) - 1;
+      for (; bits != 0; bits &= bits - 1) {
+        const std::int32_t head = x + std::countr_zero(bits);
+        heads[head_count++] = static_cast<std::uint32_t>(head);
+        const std::int32_t rank = ranks[head];
+        if (rank == kNoRank) continue;
+        const std::uint32_t id = swap_rank(settings.tie, count, static_cast<std::uint32_t>(rank));
+        __builtin_prefetch(&triangles[id]);
+        ids[id_count++] = id;
+      }
     }
-    heads.push_back(static_cast<std::uint32_t>(width));
+    heads[head_count++] = static_cast<std::uint32_t>(width);
   }
-  colours.resize(ids.size());
-  shade_in_lanes(triangles, ids, output.scene.parameters.object, colours.data(), scratch.isa);
+  shade_in_lanes(triangles, {ids, id_count}, output.scene.parameters.object, colours, scratch.isa);
 
   constexpr std::int32_t kWidest = 128;
   alignas(64) std::uint32_t row_colours[kWidest + kLanes];
   alignas(64) float row_depths[kWidest + kLanes];
-  const std::uint32_t* head = heads.data();
-  const std::uint32_t* colour = colours.data();
+  const std::uint32_t* head = heads;
+  const std::uint32_t* colour = colours;
   for (std::int32_t y = 0; y < tile.height(); ++y) {
     const std::int32_t* ranks = tile.ranks + y * tile.pitch;
     const float* depths = tile.depths + y * tile.pitch;
@@ -733,9 +818,11 @@ void resolve(const TilePixels& tile, const TileSettings& settings, TileScratch& 
 
 void draw(const TileTask& task, const TileSettings& settings, TileScratch& scratch,
           const TileOutput& output) {
-  TilePixels tile{scratch.depths.data(), scratch.ranks.data(), settings.grid.pitch(),
+  // A row's left neighbours are looked at too: the first row has room before it.
+  const std::int64_t pitch = settings.grid.pitch();
+  TilePixels tile{scratch.depths.data() + pitch, scratch.ranks.data() + pitch, pitch,
                   settings.grid.box(task.tile)};
-  clear(tile, settings.grid.side());
+  clear(tile, settings.grid.rows_in_memory());
   if (!task.first_round) load(tile, settings.grid.width, task.kept_depths, task.kept_ranks);
   TileTriangles& triangles = scratch.triangles;
   for (const FrontEnd* front_end : task.front_ends)
@@ -745,6 +832,9 @@ void draw(const TileTask& task, const TileSettings& settings, TileScratch& scrat
         draw_triangles(triangles, settings.techniques.front_to_back, tile, scratch.order);
     }
   draw_triangles(triangles, settings.techniques.front_to_back, tile, scratch.order);
+  for (const FrontEnd* front_end : task.front_ends)
+    for (auto block = front_end->small_triangles.blocks(task.tile); block != nullptr; block = block->next)
+      draw_small(*block, settings, tile);
   for (const FrontEnd* front_end : task.front_ends)
     for (auto block = front_end->fragments.blocks(task.tile); block != nullptr; block = block->next)
       for (std::int64_t i = 0; i < block->size; ++i)

@@ -28,8 +28,10 @@ struct TileGrid {
         rows((image_height + side() - 1) >> side_log2) {}
 
   int side() const { return 1 << shift; }
-  /// Of a row of a tile in memory: vectors may read and write beyond its end.
+  /// Of a row of a tile in memory: vectors may read and write beyond its end, and small triangles may be
+  /// sampled beyond the last row and column, where nothing is kept.
   int pitch() const { return side() + 16; }
+  int rows_in_memory() const { return side() + 4; }
   std::int64_t tiles() const { return columns * rows; }
   PixelBox box(std::int64_t tile) const {
     const auto x = static_cast<std::int32_t>(tile % columns) << shift;
@@ -55,7 +57,8 @@ struct TileSettings {
 /// What the front end of one worker fills, and what it uses meanwhile.
 struct FrontEnd {
   FragmentStreams fragments;
-  TriangleStreams triangles;
+  TriangleStreams small_triangles;  ///< of boxes of at most 4 x 4 pixels, each within one tile
+  TriangleStreams triangles;        ///< all others
 
   /// Triangles of a batch whose boxes hold a sample of the image.
   struct Survivors {
@@ -65,6 +68,28 @@ struct FrontEnd {
     std::int64_t size;
     std::int64_t tiles;  ///< that their boxes touch, summed
   } survivors;
+
+  void reset(std::int64_t tiles) {
+    fragments.reset(tiles);
+    small_triangles.reset(tiles);
+    triangles.reset(tiles);
+  }
+  /// Whether the survivors fit for certain: a store of fragments, of which a vector of triangles makes four
+  /// a tile, takes at most one block, and so does a triangle in each tile.
+  bool has_room() const {
+    return fragments.spare_blocks() >= 4 * survivors.size &&
+           small_triangles.spare_blocks() >= survivors.size && triangles.spare_blocks() >= survivors.tiles;
+  }
+  /// Makes room for the survivors, and for as much again as was used, so that a first frame grows few times.
+  void grow() {
+    fragments.grow(4 * survivors.size + fragments.used_blocks());
+    small_triangles.grow(survivors.size + small_triangles.used_blocks());
+    triangles.grow(survivors.tiles + triangles.used_blocks());
+  }
+  bool empty() const {
+    return fragments.used_blocks() + small_triangles.used_blocks() + triangles.used_blocks() == 0;
+  }
+  std::size_t bytes() const { return fragments.bytes() + small_triangles.bytes() + triangles.bytes(); }
 };
 
 /// Triangles of a tile, set up: x and y count from the tile's first pixel. Each row is one quantity.
@@ -85,15 +110,19 @@ struct TileTriangles {
 /// What the drawing of a tile needs; one for each worker.
 struct TileScratch {
   explicit TileScratch(const TileGrid& grid)
-      : depths(static_cast<std::size_t>(grid.side()) * static_cast<std::size_t>(grid.pitch()), "a tile"),
-        ranks(depths.size(), "a tile") {}
+      : depths(static_cast<std::size_t>(grid.rows_in_memory()) * static_cast<std::size_t>(grid.pitch()),
+               "a tile"),
+        ranks(depths.size(), "a tile"),
+        heads(depths.size(), "a tile"),
+        ids(depths.size(), "a tile"),
+        colours(depths.size(), "a tile") {}
 
-  Buffer<float> depths;        ///< side x pitch; -inf where no pixel of the image is
+  Buffer<float> depths;        ///< rows_in_memory x pitch; -inf where no pixel of the image is
   Buffer<std::int32_t> ranks;  ///< kNoRank: nothing there yet
   TileTriangles triangles;
   Isa isa = Isa::kBaseline;
-  std::vector<std::uint64_t> order;                ///< of the large triangles: nearest depth, index
-  std::vector<std::uint32_t> heads, ids, colours;  ///< of the runs of pixels that show one triangle
+  std::vector<std::uint64_t> order;           ///< of the large triangles: nearest depth, index
+  Buffer<std::uint32_t> heads, ids, colours;  ///< of the runs of pixels that show one triangle
 };
 
 inline constexpr std::int32_t kNoRank = 0x7fffffff;  ///< above every rank: T <= 2^31 - 1
