@@ -100,20 +100,24 @@ void draw_one_by_one(const TriangleStreams::Block& block, std::size_t i, const S
   });
 }
 
+/// Appends survivor i to a tile.
+void append(const FrontEnd::Survivors& from, std::size_t i, std::int64_t tile, TriangleStreams& streams) {
+  TriangleStreams::Block& block = streams.room(tile, 1);
+  const auto end = static_cast<std::size_t>(block.size++);
+  for (int corner = 0; corner < 3; ++corner) {
+    block.fields[corner][end] = as_bits(from.x[corner][i]);
+    block.fields[3 + corner][end] = as_bits(from.y[corner][i]);
+    block.fields[6 + corner][end] = as_bits(from.d[corner][i]);
+  }
+  block.fields[9][end] = static_cast<std::uint32_t>(from.ranks[i]);
+}
+
 /// Appends survivor i to every tile that its box touches. `box` lies within the image.
 void append_to_tiles(const FrontEnd::Survivors& from, std::size_t i, const PixelBox& box,
                      const TileGrid& grid, TriangleStreams& streams) {
   for (std::int64_t row = box.y0 >> grid.shift; row <= (box.y1 - 1) >> grid.shift; ++row)
-    for (std::int64_t column = box.x0 >> grid.shift; column <= (box.x1 - 1) >> grid.shift; ++column) {
-      TriangleStreams::Block& block = streams.room(row * grid.columns + column);
-      const auto end = static_cast<std::size_t>(block.size++);
-      for (int corner = 0; corner < 3; ++corner) {
-        block.fields[corner][end] = as_bits(from.x[corner][i]);
-        block.fields[3 + corner][end] = as_bits(from.y[corner][i]);
-        block.fields[6 + corner][end] = as_bits(from.d[corner][i]);
-      }
-      block.fields[9][end] = static_cast<std::uint32_t>(from.ranks[i]);
-    }
+    for (std::int64_t column = box.x0 >> grid.shift; column <= (box.x1 - 1) >> grid.shift; ++column)
+      append(from, i, row * grid.columns + column, streams);
 }
 
 }  // namespace
@@ -254,7 +258,7 @@ HWY_INLINE TinySamples sample_tiny(const LaneCorner (&unsorted)[3], const LaneBo
   return samples;
 }
 
-/// Calls visit(tile, mask) for each tile among the lanes of `lanes`.
+/// Calls visit(tile, its lanes as a mask, as bits) for each tile among `lanes`.
 template <class Visit>
 HWY_INLINE void for_each_tile(IntegerMask lanes, Integer tiles, Visit visit) {
   alignas(64) std::int32_t tile_of[kLanes];
@@ -262,8 +266,9 @@ HWY_INLINE void for_each_tile(IntegerMask lanes, Integer tiles, Visit visit) {
   for (std::uint32_t left = bits_of(lanes); left != 0;) {
     const std::int32_t tile = tile_of[std::countr_zero(left)];
     const IntegerMask here = hn::And(lanes, hn::Eq(tiles, integer(tile)));
-    visit(tile, here);
-    left &= ~bits_of(here);
+    const std::uint32_t bits = bits_of(here);
+    visit(tile, here, bits);
+    left &= ~bits;
   }
 }
 
@@ -306,7 +311,7 @@ void distribute(const TileSettings& settings, FrontEnd& front_end) {
       const TinySamples samples = sample_tiny(corners, box, grid, settings.fill);
       IntegerMask any = hn::And(tiny, samples.covered[0]);
       for (int i = 1; i < TinySamples::kPlaces; ++i) any = hn::Or(any, hn::And(tiny, samples.covered[i]));
-      for_each_tile(any, tiles, [&](std::int32_t tile, IntegerMask here) HWY_ATTR {
+      for_each_tile(any, tiles, [&](std::int32_t tile, IntegerMask here, std::uint32_t) HWY_ATTR {
         for (int i = 0; i < TinySamples::kPlaces; ++i) {
           const IntegerMask mask = hn::And(here, samples.covered[i]);
           if (hn::AllFalse(kIntegers, mask)) continue;
@@ -319,7 +324,11 @@ void distribute(const TileSettings& settings, FrontEnd& front_end) {
       });
     }
     const auto append_triangles = [&](IntegerMask lanes, TriangleStreams& streams) HWY_ATTR {
-      for_each_tile(lanes, tiles, [&](std::int32_t tile, IntegerMask here) HWY_ATTR {
+      for_each_tile(lanes, tiles, [&](std::int32_t tile, IntegerMask here, std::uint32_t bits) HWY_ATTR {
+        if ((bits & (bits - 1)) == 0) {  // alone in its tile
+          rasterbench::append(from, at + static_cast<std::size_t>(std::countr_zero(bits)), tile, streams);
+          return;
+        }
         TriangleStreams::Block& block = streams.room(tile);
         for (int i = 0; i < 3; ++i) {
           append(px[i], here, block.fields[i] + block.size);
@@ -647,8 +656,11 @@ HWY_INLINE void draw_triangle(const TileTriangles& t, std::size_t i, const int (
   const Float gx = hn::Set(kFloats, t.gx[i]), px = hn::Set(kFloats, t.px[i]);
   const Float low = hn::Set(kFloats, t.low[i]), high = hn::Set(kFloats, t.high[i]);
   const Integer rank = integer(t.ranks[i]);
+  const float first_y = static_cast<float>(tile.box.y0 + y0) + 0.5f;
+  const std::int64_t pitch = tile.pitch;
   for (std::int32_t x = t.x0[i]; x < x1; x += kWidth) {
     const Integer columns = hn::Iota(kIntegers, x);
+    const IntegerMask in_box = hn::Lt(columns, integer(x1));
     Integer value[3], per_row[3];
     for (int k = 0; k < kEdges; ++k) {
       const int e = cutting[k];
@@ -657,19 +669,19 @@ HWY_INLINE void draw_triangle(const TileTriangles& t, std::size_t i, const int (
                          hn::Mul(integer(t.per_column[e][i]), columns));
     }
     const Float of_columns = hn::Mul(gx, hn::Sub(sample_of(hn::Add(columns, integer(tile.box.x0))), px));
-    const IntegerMask in_box = hn::Lt(columns, integer(x1));
-    for (std::int32_t y = y0; y < y1; ++y) {
+    float* depths = tile.depths + y0 * pitch + x;
+    std::int32_t* ranks = tile.ranks + y0 * pitch + x;
+    float sample_y = first_y;  // small multiples of one half: exact
+    for (std::int32_t rows = y1 - y0; rows > 0; --rows, depths += pitch, ranks += pitch, sample_y += 1.0f) {
       IntegerMask inside = in_box;
       if constexpr (kEdges > 0) {
         Integer signs = value[0];
         for (int k = 1; k < kEdges; ++k) signs = hn::Or(signs, value[k]);
         inside = hn::And(inside, hn::Gt(signs, integer(-1)));
         for (int k = 0; k < kEdges; ++k) value[k] = hn::Add(value[k], per_row[k]);
-        if (hn::AllFalse(kIntegers, inside)) continue;
       }
-      const float of_row = d0 + gy * ((static_cast<float>(tile.box.y0 + y) + 0.5f) - py);
-      const Float depth = clamped(hn::Add(hn::Set(kFloats, of_row), of_columns), low, high);
-      keep(inside, depth, rank, tile.depths + y * tile.pitch + x, tile.ranks + y * tile.pitch + x);
+      const float of_row = d0 + gy * (sample_y - py);
+      keep(inside, clamped(hn::Add(hn::Set(kFloats, of_row), of_columns), low, high), rank, depths, ranks);
     }
   }
 }

@@ -17,7 +17,7 @@ namespace rasterbench {
 template <int kFields>
 class TileStreams {
  public:
-  static constexpr int kCapacity = 64;  ///< entries a block
+  static constexpr int kCapacity = 48;  ///< entries a block
   static constexpr int kOverhang = 16;  ///< entries of the widest vector: what a store may write at once
 
   struct Block {
@@ -35,10 +35,10 @@ class TileStreams {
   /// The newest block of a tile's stream, null where it is empty.
   const Block* blocks(std::int64_t tile) const { return last_[static_cast<std::size_t>(tile)]; }
 
-  /// The block of `tile` that has room for kOverhang entries more. Needs a spare block.
-  Block& room(std::int64_t tile) {
+  /// The block of `tile` that has room for `entries` more, kOverhang at most. Needs a spare block.
+  Block& room(std::int64_t tile, int entries = kOverhang) {
     Block*& last = last_[static_cast<std::size_t>(tile)];
-    if (last == nullptr || last->size > kCapacity - kOverhang) {
+    if (last == nullptr || last->size > kCapacity - entries) {
       Block& block = take();
       block.size = 0;
       block.next = last;
