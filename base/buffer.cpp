@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <sys/mman.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -90,12 +91,23 @@ std::size_t checked_bytes(std::size_t count, std::size_t size, const std::string
   return count * size;
 }
 
-void* map_pages(std::size_t bytes, const std::string& what) {
-  void* pages = mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+void* map_pages(std::size_t bytes, const std::string& what, Pages size) {
+  constexpr std::size_t kHugePage = std::size_t{2} << 20;
+  // A mapping starts anywhere: what lies before its first huge page, and as much less behind it, goes back.
+  const std::size_t margin = size == Pages::kHuge && bytes >= kHugePage ? kHugePage : 0;
+  void* pages = mmap(nullptr, bytes + margin, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
   if (pages == MAP_FAILED)
     throw InputError(fmt::format("{} needs {:.1f} GiB of memory: the system refused it", what,
                                  static_cast<double>(bytes) / kGiB));
-  return pages;
+  if (margin == 0) return pages;
+  auto* const mapped = static_cast<std::byte*>(pages);
+  const std::size_t before = (kHugePage - reinterpret_cast<std::uintptr_t>(mapped) % kHugePage) % kHugePage;
+  const auto page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+  const std::size_t end = before + (bytes + page - 1) / page * page;
+  if (before > 0) munmap(mapped, before);
+  if (bytes + margin > end) munmap(mapped + end, bytes + margin - end);
+  madvise(mapped + before, bytes, MADV_HUGEPAGE);  // a wish: where it is not granted, pages are small
+  return mapped + before;
 }
 
 void unmap_pages(void* pages, std::size_t bytes) noexcept { munmap(pages, bytes); }

@@ -52,8 +52,8 @@ class FusedTiles final : public Renderer {
                        .techniques = settings_.techniques},
         batches_((triangles().size() + kBatch - 1) / kBatch),
         workers_(static_cast<std::size_t>(execution_->threads())),
-        colours_(settings_.pixels(), "the colour buffer"),
-        depths_(settings_.pixels(), "the depth buffer"),
+        colours_(settings_.pixels(), "the colour buffer", settings_.pages()),
+        depths_(settings_.pixels(), "the depth buffer", settings_.pages()),
         ids_(setup.keeps_ids ? settings_.pixels() : 0, "the ids") {
     if (settings_.generality == Generality::kMinimal)
       settings_.geometry.needs =

@@ -47,6 +47,7 @@ struct FrameSettings {
 
   PixelBox bounds() const { return {0, 0, width, height}; }
   SampleGrid grid() const { return {fill, width, height}; }
+  Pages pages() const { return techniques.huge_pages ? Pages::kHuge : Pages::kSmall; }
   std::size_t pixels() const { return static_cast<std::size_t>(width) * static_cast<std::size_t>(height); }
 };
 

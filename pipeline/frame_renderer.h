@@ -99,9 +99,9 @@ class FrameRenderer final : public Renderer {
         count_(setup.count),
         execution_(make_execution(setup.execution)),
         screen_(scene_.model.triangles.size()),
-        keys_(settings_.pixels(), "the visibility buffer"),
-        colours_(settings_.pixels(), "the colour buffer"),
-        depths_(settings_.pixels(), "the depth buffer") {
+        keys_(settings_.pixels(), "the visibility buffer", settings_.pages()),
+        colours_(settings_.pixels(), "the colour buffer", settings_.pages()),
+        depths_(settings_.pixels(), "the depth buffer", settings_.pages()) {
     if (settings_.generality == Generality::kMinimal)
       settings_.geometry.needs =
           analyse_needs(scene_.model.triangles, make_screen_transform(camera_, Mode::kDepthFunction),
