@@ -74,7 +74,8 @@ void draw(const Drawing& drawing, const DrawOptions& options) {
     settings.width = scene.parameters.width;
     settings.height = scene.parameters.height;
   }
-  const auto renderer = make_renderer(options.kernel, options.numeric, {&scene, settings, execution});
+  const auto renderer = make_renderer(options.kernel, options.numeric,
+                                      {&scene, settings, execution, 0, /*keeps_ids=*/!drawing.ids.empty()});
   const FrameReport* report = &renderer->draw();
   std::vector<double> times;
   for (int frame = 0; frame < drawing.frames; ++frame) {

@@ -85,7 +85,8 @@ class Runner {
   std::unique_ptr<Renderer> new_renderer(const Point& point) {
     const Scene& drawn = scene(point.scene);
     if (is_peer(point)) return make_llvmpipe_renderer(drawn, point.settings());
-    return make_renderer(point.kernel, point.numeric, {&drawn, point.settings(), point.execution});
+    return make_renderer(point.kernel, point.numeric,
+                         {&drawn, point.settings(), point.execution, 0, /*keeps_ids=*/false});
   }
 
   /// One sample: a fresh renderer, one untimed frame, then `frames` timed ones as one iteration of a Google
