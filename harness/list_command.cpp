@@ -24,6 +24,7 @@ Json list_kernels() {
                     {"parallel_unit", info.parallel_unit},
                     {"synchronisation", info.synchronisation},
                     {"work", info.work},
+                    {"has_tiles", info.has_tiles},
                     {"numerics", numerics},
                     {"not_in", left_out}});
   }

@@ -47,6 +47,11 @@ def speed_of_the_script(words: list[str]) -> list[list[str]]:
     return [*syntax_only(words), ["build/release/bin/rasterbench", "study", "studies/speed.toml", *words[1:], "--dry-run"]]
 
 
+def help_only(words: list[str]) -> list[list[str]]:
+    """test_invariant0.py runs the script itself on small designs."""
+    return [[*words, "--help"]]
+
+
 def planned_only(words: list[str]) -> list[list[str]]:
     return [words if "--dry-run" in words else [*words, "--dry-run"]]
 
@@ -81,6 +86,7 @@ TABLE: list[tuple[str, Shorten]] = [
     (r"scripts/test( .*)?", syntax_only),
     (r"scripts/study( .*)?", study_of_the_script),
     (r"scripts/speed( .*)?", speed_of_the_script),
+    (r"scripts/invariant0( .*)?", help_only),
     (PRODUCT + r"rasterbench study .*", planned_only),
     (PRODUCT + r"rasterbench machine( .*)?", machine_of_a_small_point),
     (PRODUCT + r"rasterbench explain .*", explanation_of_a_small_picture),
