@@ -137,6 +137,7 @@ Json describe_context(const Study& study, const StudyOptions& options,
                         {"point_seconds", sampling.point_seconds},
                         {"launches", sampling.launches},
                         {"time_limit_s", sampling.time_limit}}}};
+  if (sampling.frame_seconds > 0) context["study"]["sampling"]["frame_seconds"] = sampling.frame_seconds;
   context["overrides"] = {
       {"scenes", options.scenes}, {"sizes", options.sizes}, {"oversubscribe", options.oversubscribe}};
   for (const PlannedPoint& planned : study.points) {

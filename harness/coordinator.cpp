@@ -157,6 +157,13 @@ class Coordinator {
                                    ? static_cast<int>(std::clamp(1.0 / frame_ms, 1.0, 1000.0))
                                    : 1;
             record_event({{"event", "verify"}, {"judgement", judgement}, {"frames", frames}}, *state);
+            const double longest = study_.sampling.frame_seconds;
+            if (state->failure.empty() && longest > 0 && frame_ms > longest * 1e3)
+              record_event({{"event", "skip"},
+                            {"reason", fmt::format("a frame takes {:.2g} s, longer than the {:g} s of "
+                                                   "frame_seconds",
+                                                   frame_ms / 1e3, longest)}},
+                           *state);
           });
       if (!state->failure.empty()) progress_.note("FAILED " + state->planned->name + ": " + state->failure);
     }

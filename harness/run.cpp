@@ -64,7 +64,8 @@ Json start_event(const Study& study, const std::vector<PointState>& states, cons
   event["scenes"] = study.hashes;
   event["plan"] = hash_bytes(plan);
   event["sampling"] = {study.sampling.target,        study.sampling.min_samples, study.sampling.max_samples,
-                       study.sampling.point_seconds, study.sampling.launches,    study.seed};
+                       study.sampling.point_seconds, study.sampling.launches,    study.seed,
+                       study.sampling.frame_seconds};
   return event;
 }
 

@@ -18,6 +18,7 @@ struct SamplingPlan {
   int min_samples = 7;   ///< at least 6, below which there is no 95 % interval
   int max_samples = 40;
   double point_seconds = 10;  ///< time that the frames of one point may take
+  double frame_seconds = 0;   ///< a point with slower frames is verified and skipped; 0: none is
   double time_limit = 0;      ///< seconds for the whole study; 0: none
   int launches = 1;           ///< processes per environment, in turn by block
 };

@@ -122,6 +122,7 @@ void read_sampling(const toml::table& table, const std::string& file, SamplingPl
   reader.integer("min_samples", 6, 100000, sampling.min_samples);
   reader.integer("max_samples", 6, 100000, sampling.max_samples);
   reader.number("point_seconds", 0.01, 1e6, sampling.point_seconds);
+  reader.number("frame_seconds", 0, 1e6, sampling.frame_seconds);
   reader.number("time_limit", 0, 1e7, sampling.time_limit);
   reader.integer("launches", 1, 100, sampling.launches);
   reader.reject_unknown_keys("[sampling]");

@@ -253,3 +253,14 @@ def test_the_picture_of_a_study_is_that_of_render(folder: Path) -> None:
     run("render", "teapot:triangles=300", "--size", "64x48", "-o", folder / "x.ppm").ok()
     (picture,) = (folder / "out/images").iterdir()
     assert read_png(picture).tobytes() == read_ppm(folder / "x.ppm").tobytes()
+
+
+def test_points_with_slow_frames_are_verified_and_skipped(tmp_path: Path) -> None:
+    study = write_study(tmp_path / "slow.toml", sampling(6, frame_seconds=1e-9), sweep("scanline"))
+    run("study", study, "--out", tmp_path / "out").ok()
+    (record,) = records(tmp_path / "out")
+    assert record["status"] == "skipped" and record["samples_ms"] == [] and record["verify"]["conforms"] is True
+    assert "longer than the 1e-09 s of frame_seconds" in record["reason"]
+    assert json.loads((tmp_path / "out/context.json").read_text())["study"]["sampling"]["frame_seconds"] == 1e-9
+    run("study", write_study(tmp_path / "fast.toml", sampling(6, frame_seconds=60), sweep("scanline")), "--out", tmp_path / "fast").ok()
+    assert [r["status"] for r in records(tmp_path / "fast")] == ["ok"]
