@@ -262,6 +262,7 @@ def stages(analysis: Analysis) -> Table:
 def verification(analysis: Analysis) -> Table:
     """Points with equal verdicts share a row: in one numeric mode all of them should."""
     rows: dict[tuple, list[Record]] = {}
+    peers: dict[str, tuple[str, Record]] = {}  # beside several groups, a peer's picture is one
     for group in analysis.groups:
         for record in group.records:
             if not record.verify:
@@ -270,6 +271,12 @@ def verification(analysis: Analysis) -> Table:
             values = [record.verify.get("conforms"), record.verify.get("differing_pixels"), accuracy(record)]
             values += [*_classes(oracle), oracle.get("max_depth_error_steps")]
             rows.setdefault((group.title, *map(str, values)), []).append(record)
+        for record in group.peers:
+            peers.setdefault(record.id, (f"{record.config.scene} {'x'.join(map(str, record.config.size))}", record))
+    for title, record in peers.values():
+        truth = record.verify.get("end_to_end")
+        if isinstance(truth, dict):
+            rows.setdefault((title, *map(str, _peer_verdict(truth))), []).append(record)
     names = ["scene", "conforms", "differing pixels", "accuracy", "wrong", "exact tie", "edge", "depth", "unexplained", "unbounded",
              "max depth error (steps)"]
     frame = pd.DataFrame([dict(zip(names, (text.MISSING if v == "None" else v for v in key)))
@@ -278,7 +285,9 @@ def verification(analysis: Analysis) -> Table:
     frame = frame.loc[:, [c not in ("exact tie", "unbounded") or bool((frame[c] != text.MISSING).any()) for c in frame]]
     return Table("verification", "Verification", "Conforms: the same bits as the scalar specification of the numeric mode. Wrong pixels have"
                  " another owner than the oracle's; their classes: an exact tie of depths, explained by an edge or by a depth gap"
-                 " within the mode's bound, unexplained, or of a mode without a bound.", frame, frame.replace({"True": "yes", "False": "NO"}))
+                 " within the mode's bound, unexplained, or of a mode without a bound."
+                 + (" A peer has no specification: its picture is judged against the end-to-end truth, by the peer's own bound."
+                    if any(r.verify for _, r in peers.values()) else ""), frame, frame.replace({"True": "yes", "False": "NO"}))
 
 
 def _classes(oracle: dict[str, Any]) -> list[Any]:
@@ -290,8 +299,16 @@ def _classes(oracle: dict[str, Any]) -> list[Any]:
     return [sum(known) if known else None, None, *former, None]
 
 
+def _peer_verdict(truth: dict[str, Any]) -> list[Any]:
+    """The cells of a peer's row: it cannot conform, and ties that its bound explains are its edges and depths."""
+    errors = truth.get("errors")
+    said = "within its bound" if errors == 0 else "outside its bound" if statistics.is_number(errors) else "not judged"
+    return [None, None, said, truth.get("wrong"), None, truth.get("edge_ties"), truth.get("depth_ties"), errors, None,
+            truth.get("max_depth_error_steps")]
+
+
 def _kernels(analysis: Analysis, records: list[Record]) -> str:
-    kernels = list(dict.fromkeys(record.config.kernel for record in records))
+    kernels = list(dict.fromkeys(strategy(record) for record in records))
     every = {record.config.kernel for record in analysis.study.records}
     return f"all {len(every)}" if len(kernels) == len(every) > 3 else ", ".join(kernels)
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Iterator
 
 from ..comparison import Analysis
-from . import balance, numerics, pareto, scaling, scenes, schedules, stages, times
+from . import balance, numerics, pareto, scaling, scenes, schedules, stage_efficiency, stages, strategy_map, times, work
 from .common import Drawing
 
-MODULES = (scenes, pareto, times, numerics, scaling, schedules, stages, balance)
+MODULES = (scenes, pareto, strategy_map, work, times, numerics, scaling, schedules, stages, stage_efficiency, balance)
 
 
 def draw(analysis: Analysis) -> Iterator[Drawing]:

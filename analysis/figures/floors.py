@@ -33,6 +33,19 @@ def notes(records: list[Record]) -> list[str]:
     return [NOTE] if by_threads(records) else []
 
 
+def beside(records: list[Record], fastest: dict[str, float]) -> tuple[str, list[str]]:
+    """For a figure whose places are taken: words for its title, and a note that gives the fastest times in milliseconds by name
+    as multiples of the floor. Empty where there is none."""
+    found = by_threads(records)
+    if len(found) != 1:  # one line of words for one number of threads
+        return "", []
+    (floor,) = found.values()
+    times = text.listing([f"{text.number(value / floor)} times for {name}" for name, value in fastest.items()], 12)
+    return f"; floor {text.number(floor)}", [
+        f"The floor of the picture is {text.number(floor)} ms, the time in which each triangle is read once and each pixel written once"
+        f" at the measured bandwidth; the fastest cells take it {times}."]
+
+
 def key(far: list[float] | None = None) -> Line2D:
     """far: lines that are named because they are too far from the points to be drawn."""
     return Line2D([], [], color=style.GREY, lw=0.9, ls=DOTTED, label=LABEL + (f"; off the axis at {span(far)}" if far else ""))
@@ -55,6 +68,11 @@ def reached(limits: tuple[float, float], log: bool, lines: dict[int, float]) -> 
 def across(axes: Axes, at: float, colour: str) -> None:
     """A line across the rows of a dot plot."""
     axes.axvline(at, color=colour, lw=0.9, ls=DOTTED, zorder=1, label=DRAWN)
+
+
+def across_row(axes: Axes, at: float, y: float) -> None:
+    """A line across one row, whose thread count the others need not share; on top of its bar."""
+    axes.plot([at, at], [y - 0.48, y + 0.48], color="black", lw=1.1, ls=DOTTED, zorder=5, label=DRAWN, scalex=False, scaley=False)
 
 
 def over_threads(axes: Axes, lines: list[dict[int, float]], colours: list[str]) -> None:

@@ -11,6 +11,7 @@ from matplotlib.patches import Patch, Rectangle
 
 from .. import captions, style, text
 from ..comparison import Analysis, Group, Panel
+from . import floors
 from .common import Drawing, named, part
 
 SECTION = "Schedules and chunks"
@@ -37,8 +38,10 @@ def _draw(analysis: Analysis, group: Group, panels: list[Panel], threads: int) -
     down = max(1, int((style.MAX_HEIGHT - 1.3) / (len(rows) * CELL_HEIGHT + 0.45)))
     split = [panels[i:i + across * down] for i in range(0, len(panels), across * down)]
     for page, chosen in enumerate(split):
-        figure = _figure(analysis, group, chosen, rows, chunks, across, threads, part(page, len(split)))
         shown = [r for panel in chosen for r in panel.cells.values() if r.ok]
+        best = {panel.kernel: min(analysis.estimates[r.id].value for r in panel.cells.values() if r.ok) for panel in chosen}
+        floor, floor_notes = floors.beside(shown, best)
+        figure = _figure(analysis, group, chosen, rows, chunks, across, threads, part(page, len(split)), floor)
         caption = captions.build(
             analysis, f"Schedule and chunk, {group.title}, {text.count(threads, 'thread')}{part(page, len(split))}",
             "Look for pale cells: shades give the time relative to the fastest cell of the same panel, numbers the time.",
@@ -46,12 +49,12 @@ def _draw(analysis: Analysis, group: Group, panels: list[Panel], threads: int) -
             notes=[f"Cells are median times of a frame in ms ({analysis.sampled(shown)}); 'default' leaves the chunk to the"
                    " runtime. The thick frame is the fastest cell of a panel, thin frames cannot be told apart from it (rank"
                    f" test, Holm-corrected within the panel and for all {len(analysis.panels)} panels, and paired interval). Other thread counts are in the"
-                   " table of all points."])
+                   " table of all points.", *floor_notes])
         yield Drawing(named(f"schedules_{group.slug}", page, len(split)), SECTION, figure, caption)
 
 
 def _figure(analysis: Analysis, group: Group, panels: list[Panel], rows: list[str], chunks: list[int | None],
-            across: int, threads: int, suffix: str):
+            across: int, threads: int, suffix: str, floor: str):
     left = 0.2 + style.text_width(rows, 7)
     wide = min(0.75 * len(chunks), (style.FULL_WIDTH - left - 0.1) / across - 0.15)
     tall = len(rows) * CELL_HEIGHT
@@ -69,7 +72,7 @@ def _figure(analysis: Analysis, group: Group, panels: list[Panel], rows: list[st
         axes.set_xticks(range(len(chunks)), [_chunk(c) for c in chunks] if last else [""] * len(chunks), fontsize=7)
         if last:
             axes.set_xlabel("chunk or grain (iterations)", fontsize=7.5, labelpad=2)
-    style.title(figure, f"{group.title}, {text.count(threads, 'thread')}{suffix}: median time of a frame (ms)")
+    style.title(figure, f"{group.title}, {text.count(threads, 'thread')}{suffix}: median time of a frame (ms{floor})")
     bar = style.place(figure, left, 0.34, 2.0, 0.09)
     figure.colorbar(ScalarMappable(norm, SHADES), cax=bar, orientation="horizontal",
                     extend="max" if _worst(panels) > DARKEST else "neither")

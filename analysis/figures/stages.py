@@ -11,6 +11,7 @@ from matplotlib.patches import Patch
 from .. import captions, style, text
 from ..comparison import Analysis, Group
 from ..load import STAGES, Record
+from . import floors
 from .common import Block, Drawing, Row, drawn_together, named, pages, part, row_frame
 
 SECTION = "Stages of a frame"
@@ -64,6 +65,8 @@ def _draw(analysis: Analysis, group: Group) -> Iterator[Drawing]:
     keys = [Patch(facecolor=style.COLOURS[i], hatch=style.HATCHES[i % 6], edgecolor="white", lw=0, label=name)
             for i, name in enumerate(names)]
     keys.append(Line2D([], [], color="black", marker="|", ms=9, mew=1.4, lw=0, label="median of the whole frame"))
+    if floors.by_threads(records):
+        keys.append(floors.key())
     for page, chosen in enumerate(split):
         shown = [by_label[(block.kernel, row.label)] for block in chosen for row in block.rows]
         frame = row_frame(chosen, group.title + part(page, len(split)), "median time of a stage (ms)", limits=(0, limit),
@@ -77,6 +80,7 @@ def _draw(analysis: Analysis, group: Group) -> Iterator[Drawing]:
                          " has all.")
         if totals[-1] > limit * style.HEADROOM:
             notes.append("Bars that leave the axis end in an arrow and their time in ms.")
+        notes += floors.notes(shown)
         caption = captions.build(analysis, f"Stages of a frame, {group.title}{part(page, len(split))}",
                                  "Long parts are where time can be won; a part that does not shrink with more threads"
                                  " limits the speedup.", shown, estimates=None, notes=notes)
@@ -96,5 +100,7 @@ def _bar(analysis: Analysis, axes, y: float, record: Record, names: list[str], e
         axes.barh(y, min(length, max(0.0, edge - start)), left=start, height=0.68, color=style.COLOURS[i],
                   hatch=style.HATCHES[i % 6], edgecolor="white", lw=0, zorder=2)
         start += length
+    if record.floor_ms is not None:
+        floors.across_row(axes, record.floor_ms, y)
     if start <= edge:
         axes.plot(analysis.estimates[record.id].value, y, marker="|", ms=9, mew=1.4, color="black", zorder=4)
