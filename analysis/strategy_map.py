@@ -27,14 +27,14 @@ class Cell:
     group: Group
     triangles: int
     pixels_per_triangle: float
-    best: Record | None  # None where fewer than two kernels were timed
-    second: Record | None
+    best: Record | None  # None where nothing was timed
+    second: Record | None  # None where no other kernel was
     lead: Estimate | None  # time of the second / time of the best
-    tied: tuple[str, ...]  # kernels that cannot be told apart from the best, itself first; of length 1: it wins
+    tied: tuple[str, ...]  # other kernels that cannot be told apart from the best, the nearest first; empty: it wins
 
     @property
     def winner(self) -> str | None:
-        return None if self.best is None else self.best.config.kernel if len(self.tied) == 1 else TIE
+        return None if self.best is None else TIE if self.tied else self.best.config.kernel
 
 
 @dataclass(frozen=True)
@@ -92,10 +92,11 @@ def _cell(analysis: Analysis, group: Group, counted: Record) -> Cell:
         if best is not None and kernel != best.config.kernel and (
                 kernel not in rivals or analysis.estimates[record.id].value < analysis.estimates[rivals[kernel].id].value):
             rivals[kernel] = record
-    second = analysis.fastest(list(rivals.values()))
-    tied = [kernel for kernel, record in rivals.items() if group.comparisons[record.id].verdict != "slower"]
-    return Cell(group, triangles(counted), pixels_per_triangle(counted), best if second is not None else None, second,
-                None if second is None else group.comparisons[second.id].ratio, (best.config.kernel, *tied) if second is not None else ())
+    nearest = sorted(rivals.values(), key=lambda r: analysis.estimates[r.id].value)
+    second = nearest[0] if nearest else None
+    tied = tuple(r.config.kernel for r in nearest if group.comparisons[r.id].verdict != "slower")
+    lead = None if second is None else group.comparisons[second.id].ratio
+    return Cell(group, triangles(counted), pixels_per_triangle(counted), best, second, lead, tied)
 
 
 def clusters(values: list) -> list[tuple]:
@@ -131,16 +132,17 @@ def _table(analysis: Analysis, found: Map) -> Table:
     for _, cell in sorted(found.cells.items(), key=lambda place: (place[0][1], place[0][0])):
         row = {"scene": cell.group.records[0].config.scene, "triangles": cell.triangles, "pixels_per_triangle": cell.pixels_per_triangle}
         said = {"triangles": f"{cell.triangles:,}", "pixels per triangle": pixels(cell.pixels_per_triangle)}
-        if cell.best is None:
-            numbers.append(row)
-            words.append(said | {"fastest": "fewer than two kernels were timed"})
+        if cell.second is None:
+            alone = cell.best.config.kernel if cell.best is not None else None
+            numbers.append(row | {"best": alone})
+            words.append(said | {"fastest": f"{alone}, no other was timed" if alone else "none was timed"})
             continue
         best, second = (analysis.estimates[r.id] for r in (cell.best, cell.second))
         numbers.append(row | {"best": cell.best.config.kernel, **columns("best_ms", best), "second": cell.second.config.kernel,
-                              **columns("second_ms", second), **columns("lead", cell.lead), "tied": " ".join(cell.tied[1:]),
+                              **columns("second_ms", second), **columns("lead", cell.lead), "tied": " ".join(cell.tied),
                               "floor_ms": cell.best.floor_ms})
         said |= {"fastest": cell.best.config.kernel, "ms": times(best), "second": cell.second.config.kernel,
-                 "its time / the fastest": times(cell.lead), "not told apart": ", ".join(cell.tied[1:])}
+                 "its time / the fastest": times(cell.lead), "not told apart": ", ".join(cell.tied)}
         words.append(said)
     return Table(f"map_{found.slug}", f"The fastest strategy by triangles and their size, {found.title}",
                  "Pixels per triangle: fragments covered per triangle drawn, as counted. Not told apart: kernels whose difference from the"

@@ -83,10 +83,12 @@ def test_scenes_of_a_folder(tmp_path: Path) -> None:
         (tmp_path / "models" / name).mkdir(parents=True)
         file = tmp_path / "models" / name / name
         run("scene", f"teapot:triangles={triangles}", "-o", file.with_suffix(".dat"), "--parameters", file.with_suffix(".txt")).ok()
+    (tmp_path / "models/small/other.dat.xz").write_bytes(b"")
     done = invariant0("--out", tmp_path / "out", "--scenes", tmp_path / "models", "--largest", "1000", "--kernel", "scanline", *TINY)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "small" in {r["config"]["scene"] for r in records(tmp_path / "out/records")}
     assert re.search(r"left out: .*large\.dat: \d+ triangles, more than --largest 1000", done.stdout)
+    assert "other.dat: only other.dat.xz is there" in done.stdout
     assert "7 scenes" in done.stdout.splitlines()[-1]
 
 

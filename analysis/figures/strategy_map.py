@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Iterator
 
+from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Patch, Rectangle
 
@@ -32,8 +33,10 @@ def _draw(analysis: Analysis, found: Map) -> Drawing:
     named = [strategy_map.interval(*row) for row in rows]
     left = 0.45 + style.text_width(named, 7.5)
     wide = (style.FULL_WIDTH - left - 0.1) / len(across)
-    winners = [k for k in found.kernels if any(k in cell.tied for cell in found.cells.values())]
-    keys = [Patch(facecolor=paled(style.look(found.kernels.index(k)).colour), edgecolor="black", lw=0.4, label=k) for k in winners]
+    # Colours for those that lead somewhere only: the first of the palette are the easiest to tell apart.
+    leaders = [k for k in found.kernels if any(c.best is not None and c.best.config.kernel == k for c in found.cells.values())]
+    colours = {kernel: paled(style.look(i).colour) for i, kernel in enumerate(leaders)}
+    keys = [Patch(facecolor=colour, edgecolor="black", lw=0.4, label=kernel) for kernel, colour in colours.items()]
     keys.append(Patch(facecolor="white", hatch=TIE_HATCH, edgecolor="#8C8C8C", lw=0.4, label="tie: the best two cannot be told apart"))
     if len(found.cells) < len(rows) * len(across):
         keys.append(Patch(facecolor="white", edgecolor="#BFBFBF", lw=0.6, ls=":", label="blank: not measured"))
@@ -53,7 +56,7 @@ def _draw(analysis: Analysis, found: Map) -> Drawing:
             if cell is None:
                 axes.add_patch(Rectangle((x - 0.47, y - 0.46), 0.94, 0.92, facecolor="none", edgecolor="#BFBFBF", lw=0.6, ls=":"))
             else:
-                _cell(axes, x, y, cell, found, 72 * wide * 0.9)
+                _cell(axes, x, y, cell, colours, 72 * wide * 0.8)
     axes.set_xticks(range(len(across)), [f"{low:,}" if low == high else f"{low:,} to {high:,}" for low, high in across])
     axes.set_yticks(range(len(rows)), named)
     axes.set_xlabel("triangles")
@@ -63,7 +66,7 @@ def _draw(analysis: Analysis, found: Map) -> Drawing:
     figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.05 / style.FULL_WIDTH, 0.03 / height), ncol=per_row,
                   borderaxespad=0.2, columnspacing=1.2)
     notes = ["A cell names the fastest kernel and how many times its time the best other kernel takes (paired median). Hatched: the best"
-             " two cannot be told apart (rank test, corrected for all pictures, and paired interval); both are named.",
+             " two cannot be told apart (rank test, corrected for all pictures, and paired interval); both are named, with how many more.",
              "Pixels per triangle are the fragments covered per triangle drawn."]
     blank = len(rows) * len(across) - len(found.cells)
     if blank:
@@ -78,29 +81,28 @@ def _draw(analysis: Analysis, found: Map) -> Drawing:
     executions = sorted({analysis.execution(r) for r in shown})
     notes.append(f"Compared are {text.listing(found.kernels, 12)}, with {text.listing(executions, 3)}.")
     caption = captions.build(analysis, f"Where each strategy wins, {found.title}",
-                             "Find the cell of a scene by its triangles and the pixels that each covers; where the lead is small or the cell"
-                             " hatched, the choice matters little.", shown, estimates=None, notes=notes)
+                             "Find the cell of a scene by its triangles and the pixels that each covers; where the lead is small or the"
+                             " cell hatched, the choice matters little.", shown, estimates=None, notes=notes)
     return Drawing(f"map_{found.slug}", strategy_map.SECTION, figure, caption)
 
 
-def _cell(axes, x: int, y: int, cell: Cell, found: Map, room: float) -> None:
+def _cell(axes: Axes, x: int, y: int, cell: Cell, colours: dict[str, tuple[float, float, float]], room: float) -> None:
     """room: points that words may take."""
     if cell.best is None:
-        axes.text(x, y, "one kernel timed" if cell.group.timed else "none timed", fontsize=6.5, style="italic", color=style.FAILED,
+        axes.text(x, y, "none timed", fontsize=6.5, style="italic", color=style.FAILED,
                   ha="center", va="center")
         return
-    colour = paled(style.look(found.kernels.index(cell.best.config.kernel)).colour)
+    colour = colours[cell.best.config.kernel]
     tie = cell.winner == strategy_map.TIE
     axes.add_patch(Rectangle((x - 0.47, y - 0.46), 0.94, 0.92, facecolor=colour, edgecolor="black", lw=0.4))
     if tie:
         # The hatch keeps to the rim, so that the words stay readable.
         axes.add_patch(Rectangle((x - 0.47, y - 0.46), 0.94, 0.92, facecolor="none", hatch=TIE_HATCH, edgecolor="#8C8C8C", lw=0))
         axes.add_patch(Rectangle((x - 0.42, y - 0.36), 0.84, 0.72, facecolor=colour, lw=0))
-    second = cell.tied[1] if tie else None
-    more = len(cell.tied) - 2
-    lead = f"{text.number(cell.lead.value)}x"
-    lines = [cell.best.config.kernel, f"tie: {second}" + (f" +{more}" if more > 0 else "") if tie else lead]
-    sizes = (7.5, 6.5 if tie else 7.5)
+    more = f" +{len(cell.tied) - 1}" if len(cell.tied) > 1 else ""
+    lead = f"tie: {cell.tied[0]}{more}" if tie else f"{text.number(cell.lead.value)}x" if cell.lead else "no other timed"
+    lines = [cell.best.config.kernel, lead]
+    sizes = (7.5, 7.5 if cell.lead and not tie else 6.5)
     for words, size, at in zip(lines, sizes, (0.17, -0.17)):
         fits = min(size, size * room / (72 * style.text_width([words], size, bold=at > 0)))
         axes.text(x, y + at, words, fontsize=fits, ha="center", va="center", weight="bold" if at > 0 else "normal")
