@@ -117,6 +117,7 @@ def test_the_study_is_good_before_it_is_spoilt(folder: Path) -> None:
     ("max_samples", "max_samples = 5", ["max_samples: "]),
     ("point_seconds", "point_seconds = -1", ["point_seconds: "]),
     ("point_seconds", "point_seconds = inf", ["point_seconds: "]),
+    ("point_seconds", "frame_seconds = -1", ["frame_seconds: "]),
     ("time_limit", "time_limit = true", ["time_limit: "]),
     ("time_limit", "time_limit = 9007199254740993", ["time_limit: "]),
     ("launches", "launches = 0", ["launches: ", "from 1"]),
