@@ -79,7 +79,13 @@ class TileStreams {
     while (used_ >= chunks_[chunk_].first + static_cast<std::int64_t>(chunks_[chunk_].blocks.size()))
       ++chunk_;
     Chunk& chunk = chunks_[chunk_];
-    return chunk.blocks[static_cast<std::size_t>(used_++ - chunk.first)];
+    const auto number = static_cast<std::size_t>(used_++ - chunk.first);
+    // The next block will be written soon: what a store waits for is that its line arrives.
+    if (number + 1 < chunk.blocks.size()) {
+      auto* const next = reinterpret_cast<const char*>(&chunk.blocks[number + 1]);
+      for (std::size_t line = 0; line < sizeof(Block); line += 64) __builtin_prefetch(next + line, 1);
+    }
+    return chunk.blocks[number];
   }
 
   std::vector<Block*> last_;   // per tile
