@@ -358,18 +358,18 @@ void distribute(const TileSettings& settings, FrontEnd& front_end) {
   }
 }
 
-/// Fetches the block that comes next: blocks lie anywhere in memory.
+/// Fetches a block ahead of its use: blocks lie anywhere in memory.
 template <class Block>
-HWY_INLINE void fetch_next(const Block& block) {
-  if (block.next == nullptr) return;
-  const auto* bytes = reinterpret_cast<const char*>(block.next);
+HWY_INLINE void fetch(const Block* block) {
+  if (block == nullptr) return;
+  const auto* bytes = reinterpret_cast<const char*>(block);
   for (std::size_t line = 0; line < sizeof(Block); line += 64) __builtin_prefetch(bytes + line);
 }
 
 /// Draws the small triangles of a block, each in a lane: one place of all boxes at a time. A sample beyond a
 /// box is outside of an edge or beyond the image, where the tile keeps nothing.
 void draw_small(const TriangleStreams::Block& block, const TileSettings& settings, TilePixels& tile) {
-  fetch_next(block);
+  fetch(block.next);
   for (std::int64_t first = 0; first < block.size; first += kWidth) {
     const IntegerMask valid = hn::FirstN(kIntegers, static_cast<std::size_t>(block.size - first));
     const auto field = [&](int f) HWY_ATTR { return hn::Load(kCodes, block.fields[f] + first); };
@@ -556,7 +556,7 @@ HWY_INLINE void store(Float v, IntegerMask mask, float* to) {
 /// Sets up what of a block reaches the tile; triangles too large for 32 bits are drawn at once.
 void set_up(const TriangleStreams::Block& block, const TileSettings& settings, TilePixels& tile,
             TileTriangles& out) {
-  fetch_next(block);
+  fetch(block.next);
   const Integer left = integer(tile.box.x0 * 256 + 128), top = integer(tile.box.y0 * 256 + 128);
   const Integer one = integer(1), zero = hn::Zero(kIntegers);
   for (std::int64_t first = 0; first < block.size; first += kWidth) {
@@ -785,6 +785,7 @@ void resolve(const TilePixels& tile, const TileSettings& settings, TileScratch& 
         if (rank == kNoRank) continue;
         const std::uint32_t id = swap_rank(settings.tie, count, static_cast<std::uint32_t>(rank));
         __builtin_prefetch(&triangles[id]);
+        __builtin_prefetch(&triangles[id].c.z);  // may lie in the next line
         ids[id_count++] = id;
       }
     }
@@ -834,6 +835,11 @@ void draw(const TileTask& task, const TileSettings& settings, TileScratch& scrat
   const std::int64_t pitch = settings.grid.pitch();
   TilePixels tile{scratch.depths.data() + pitch, scratch.ranks.data() + pitch, pitch,
                   settings.grid.box(task.tile)};
+  for (const FrontEnd* front_end : task.front_ends) {
+    fetch(front_end->triangles.blocks(task.tile));
+    fetch(front_end->small_triangles.blocks(task.tile));
+    fetch(front_end->fragments.blocks(task.tile));
+  }
   clear(tile, settings.grid.rows_in_memory());
   if (!task.first_round) load(tile, settings.grid.width, task.kept_depths, task.kept_ranks);
   TileTriangles& triangles = scratch.triangles;
@@ -848,10 +854,12 @@ void draw(const TileTask& task, const TileSettings& settings, TileScratch& scrat
     for (auto block = front_end->small_triangles.blocks(task.tile); block != nullptr; block = block->next)
       draw_small(*block, settings, tile);
   for (const FrontEnd* front_end : task.front_ends)
-    for (auto block = front_end->fragments.blocks(task.tile); block != nullptr; block = block->next)
+    for (auto block = front_end->fragments.blocks(task.tile); block != nullptr; block = block->next) {
+      fetch(block->next);
       for (std::int64_t i = 0; i < block->size; ++i)
         tile.keep(block->fields[2][i], as_float(block->fields[0][i]),
                   static_cast<std::int32_t>(block->fields[1][i]));
+    }
   if (task.last_round) {
     resolve(tile, settings, scratch, output);
     hwy::FlushStream();
