@@ -32,11 +32,12 @@ CountedFrames count_frames(const Point& point, const Scene& scene) {
   RendererSetup setup{.scene = &scene, .settings = point.settings(), .execution = point.execution};
   CountedFrames result;
   {
+    setup.keeps_ids = false;
     const auto timed = make_renderer(point.kernel, point.numeric, setup);
     timed->draw();  // starts the threads and touches the buffers
     result.hardware = count_hardware([&] { timed->draw(); });
   }
-  setup.count = true;
+  setup.keeps_ids = setup.count = true;
   const auto counting = make_renderer(point.kernel, point.numeric, setup);
   result.report = counting->draw();
   result.picture = picture_hash(*counting);
@@ -54,6 +55,8 @@ Json work_counters_json(const WorkCounters& c) {
           {"tiles", or_null(c.tiles)},
           {"tiles_touched", or_null(c.tiles_touched)},
           {"bin_entries", or_null(c.bin_entries)},
+          {"hidden_entries", or_null(c.hidden_entries)},
+          {"binned_fragments", or_null(c.binned_fragments)},
           {"merges", or_null(c.merges)},
           {"bytes",
            {{"clear", bytes_json(c.clear_bytes)},

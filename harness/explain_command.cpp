@@ -108,6 +108,10 @@ void print_times(const Json& e) {
   fmt::print("{:<10}{:>11}{:>22}{:>8}{:>11}{:>11}{:>11}{:>8}\n", "stage", "median ms", "95 % interval", "%",
              "MB read", "MB written", "floor ms", "GB/s");
   for (const auto& [name, stage] : e.at("stages").items()) {
+    if (stage.is_null()) {
+      fmt::print("{:<10}{:>11}\n", name, "none");
+      continue;
+    }
     const Json& bytes = stage.at("bytes");
     fmt::print("{:<10}{:>11}{:>22}{:>8.1f}{:>11}{:>11}{:>11}{:>8}\n", name, number(stage.at("median_ms")),
                interval(stage), 100 * stage.at("share").get<double>(),
@@ -167,6 +171,10 @@ void print_counters(const Json& e) {
   if (!c.at("bin_entries").is_null())
     fmt::print("bins: {} cells, {} touched, {} entries\n", whole(c.at("tiles")), whole(c.at("tiles_touched")),
                whole(c.at("bin_entries")));
+  if (!c.at("hidden_entries").is_null())
+    fmt::print(
+        "of these entries {} hidden and left out; {} fragments of tiny triangles in place of triangles\n",
+        whole(c.at("hidden_entries")), whole(c.at("binned_fragments")));
   if (!c.at("merges").is_null()) fmt::print("keys merged from private buffers: {}\n", whole(c.at("merges")));
 }
 

@@ -26,15 +26,15 @@ constexpr double kManySwitches = 2;    // a thread and frame
 /// The times of a point's frames in milliseconds, one a sample.
 struct Times {
   std::vector<double> frame, busy_mean, busy_longest, imbalance, serial;
-  std::array<std::vector<double>, 4> stages;
-  std::vector<std::vector<double>> busy;  // by worker
+  std::array<std::vector<double>, 4> stages;  // empty: the kernel has no such stage
+  std::vector<std::vector<double>> busy;      // by worker
 };
 constexpr std::array kStages{"clear", "geometry", "raster", "resolve"};
 
 Times time_frames(const Point& point, const Scene& scene, int samples, Progress& progress) {
-  const auto renderer =
-      make_renderer(point.kernel, point.numeric,
-                    {.scene = &scene, .settings = point.settings(), .execution = point.execution});
+  const auto renderer = make_renderer(
+      point.kernel, point.numeric,
+      {.scene = &scene, .settings = point.settings(), .execution = point.execution, .keeps_ids = false});
   renderer->draw();  // touches the buffers; the second frame meets them warm
   renderer->draw();
   Times times;
@@ -46,7 +46,7 @@ Times time_frames(const Point& point, const Scene& scene, int samples, Progress&
     times.frame.push_back(1e3 * s.total());
     const std::array seconds{s.clear, s.geometry, s.raster, s.resolve};
     for (std::size_t stage = 0; stage < seconds.size(); ++stage)
-      times.stages[stage].push_back(1e3 * seconds[stage]);
+      if (seconds[stage]) times.stages[stage].push_back(1e3 * *seconds[stage]);
     double sum = 0, longest = 0;
     for (std::size_t worker = 0; worker < report.raster_tally.size(); ++worker) {
       const double busy = 1e3 * report.raster_tally[worker].busy_seconds;
@@ -58,7 +58,7 @@ Times time_frames(const Point& point, const Scene& scene, int samples, Progress&
     times.busy_mean.push_back(mean);
     times.busy_longest.push_back(longest);
     times.imbalance.push_back(longest - mean);
-    times.serial.push_back(std::max(0.0, 1e3 * s.raster - longest));
+    times.serial.push_back(std::max(0.0, 1e3 * s.raster.value_or(0) - longest));
   }
   return times;
 }
@@ -103,6 +103,10 @@ Json stages_json(const Times& times, const WorkCounters& counters, const Json& l
                          counters.resolve_bytes};
   Json stages;
   for (std::size_t i = 0; i < kStages.size(); ++i) {
+    if (times.stages[i].empty()) {
+      stages[kStages[i]] = nullptr;
+      continue;
+    }
     Json stage = median_json(times.stages[i]);
     const double ms = stage.at("median_ms");
     stage["share"] = ms / median(times.frame);
@@ -260,18 +264,23 @@ Json explain_point(const Point& point, const Scene& scene, int samples) {
   json["hardware_rates"] = hardware_rates_json(counted.hardware, triangle_count, verified.samples_inside);
   json["cost_ladder"] = ladder_json(point, scene, samples, floor, progress);
 
+  const auto stage_median = [&](std::size_t stage) {
+    return times.stages[stage].empty() ? 0.0 : median(times.stages[stage]);
+  };
   PointCosts costs{.frame = median(times.frame),
-                   .clear = median(times.stages[0]),
-                   .geometry = median(times.stages[1]),
-                   .raster = median(times.stages[2]),
-                   .resolve = median(times.stages[3]),
+                   .clear = stage_median(0),
+                   .geometry = stage_median(1),
+                   .raster = stage_median(2),
+                   .resolve = stage_median(3),
                    .raster_imbalance = median(times.imbalance),
                    .raster_serial = median(times.serial),
                    .floor = floor,
                    .own_bytes = 0.0,
                    .ipc = {}};
   for (const auto& [name, stage] : json["stages"].items())
-    if (stage.at("floor_ms").is_null())
+    if (stage.is_null())
+      continue;
+    else if (stage.at("floor_ms").is_null())
       costs.own_bytes.reset();
     else if (costs.own_bytes)
       *costs.own_bytes += stage.at("floor_ms").get<double>();

@@ -90,18 +90,19 @@ void draw(const Drawing& drawing, const DrawOptions& options) {
   if (drawing.quiet) return;
 
   const GeometryCounts& c = report->counts;
+  std::string stages;
   const StageSeconds& s = report->seconds;
+  for (const auto& [name, seconds] : {std::pair{"clear", s.clear}, std::pair{"geometry", s.geometry},
+                                      std::pair{"raster", s.raster}, std::pair{"resolve", s.resolve}})
+    if (seconds) stages += fmt::format("{}{} {:.3f}", stages.empty() ? "" : ", ", name, *seconds * 1e3);
   fmt::print("{} at {}x{}: {} triangles, {} drawn", drawing.model, settings.width, settings.height,
              c.triangles, c.drawn);
   if (c.near_clipped) fmt::print(", {} cut at the near plane", c.near_clipped);
   if (c.non_finite) fmt::print(", {} with a coordinate that is not finite left out", c.non_finite);
   if (c.zero_area) fmt::print(", {} without area left out", c.zero_area);
-  fmt::print(
-      "\n{} {} {} on {} thread{}: {:.3f} ms (median of {}; last: clear {:.3f}, geometry {:.3f}, raster "
-      "{:.3f}, resolve {:.3f})\n",
-      options.kernel, options.numeric, to_string(execution), execution.threads,
-      execution.threads == 1 ? "" : "s", median(times), times.size(), s.clear * 1e3, s.geometry * 1e3,
-      s.raster * 1e3, s.resolve * 1e3);
+  fmt::print("\n{} {} {} on {} thread{}: {:.3f} ms (median of {}; last: {})\n", options.kernel,
+             options.numeric, to_string(execution), execution.threads, execution.threads == 1 ? "" : "s",
+             median(times), times.size(), stages);
   if (drawing.explain) print_needs(scene, settings, *find_mode(options.numeric));
   for (const std::string& file : {drawing.image, drawing.ids, drawing.depth})
     if (!file.empty()) fmt::print("wrote {}\n", file);

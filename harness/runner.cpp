@@ -111,10 +111,7 @@ class Runner {
             const auto begin = std::chrono::steady_clock::now();
             for (int frame = 0; frame < frames; ++frame) {
               report = &renderer->draw();
-              stages.clear += report->seconds.clear;
-              stages.geometry += report->seconds.geometry;
-              stages.raster += report->seconds.raster;
-              stages.resolve += report->seconds.resolve;
+              stages += report->seconds;
             }
             state.SetIterationTime(
                 std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
@@ -129,12 +126,13 @@ class Runner {
 
     const double per_frame_ms = 1e3 / frames;
     answer["ms"] = reporter.last.real_accumulated_time * per_frame_ms;
-    answer["stages"] = {{"clear", stages.clear * per_frame_ms},
-                        {"geometry", stages.geometry * per_frame_ms},
-                        {"raster", stages.raster * per_frame_ms},
-                        {"resolve", stages.resolve * per_frame_ms}};
-    if (is_peer(point))  // one stage, from outside
-      for (const char* stage : {"clear", "geometry", "resolve"}) answer["stages"][stage] = nullptr;
+    const auto stage_ms = [&](const std::optional<double>& seconds) {
+      return seconds ? Json(*seconds * per_frame_ms) : Json();
+    };
+    answer["stages"] = {{"clear", stage_ms(stages.clear)},
+                        {"geometry", stage_ms(stages.geometry)},
+                        {"raster", stage_ms(stages.raster)},
+                        {"resolve", stage_ms(stages.resolve)}};
     Json& threads = answer["per_thread"] = Json::array();
     for (const WorkerTally& worker : report->raster_tally)
       threads.push_back(

@@ -43,6 +43,7 @@ class FusedTiles final : public Renderer {
         camera_(sized_camera(scene_, settings_)),
         permutation_seed_(setup.permutation_seed),
         stream_budget_(setup.stream_budget),
+        count_(setup.count),
         execution_(make_execution(setup.execution)),
         lanes_(tile_lanes(settings_.geometry.isa)),
         tile_settings_{.grid = TileGrid(settings_.width, settings_.height, tile_shift(settings_.tile)),
@@ -74,15 +75,24 @@ class FusedTiles final : public Renderer {
     report_.seconds = {};
     execution_->reset_tally();
     for (Batch& batch : batches_) batch = {};
+    for (const auto& worker : workers_) worker->scratch.hidden_entries = 0;
+    WorkCounters counters;
     bool first_round = true, last_round = false;
     while (!last_round) {
-      report_.seconds.geometry += timed([&] { last_round = fill_streams(); });
-      report_.seconds.raster += timed([&] { draw_tiles(first_round, last_round); });
+      StageSeconds seconds;
+      seconds.geometry = timed([&] { last_round = fill_streams(); });
+      if (count_) count_streams(counters);
+      seconds.raster = timed([&] { draw_tiles(first_round, last_round); });
+      report_.seconds += seconds;
       first_round = false;
     }
     report_.raster_tally.assign(execution_->tally().begin(), execution_->tally().end());
     report_.counts = std::accumulate(batches_.begin(), batches_.end(), GeometryCounts{},
                                      [](GeometryCounts sum, const Batch& b) { return sum += b.counts; });
+    if (count_) {
+      count_rest(counters);
+      report_.counters = counters;
+    }
     return report_;
   }
 
@@ -216,6 +226,45 @@ class FusedTiles final : public Renderer {
     });
   }
 
+  /// Adds what is in the streams, once a round.
+  void count_streams(WorkCounters& counters) const {
+    const std::int64_t tiles = tile_settings_.grid.tiles();
+    counters.tiles = tiles;
+    std::int64_t touched = 0, entries = 0, fragments = 0;
+    for (std::int64_t tile = 0; tile < tiles; ++tile) {
+      std::int64_t triangles_here = 0, fragments_here = 0;
+      for (const FrontEnd* front_end : front_ends_) {
+        triangles_here += front_end->small_triangles.entries(tile) + front_end->triangles.entries(tile);
+        fragments_here += front_end->fragments.entries(tile);
+      }
+      touched += triangles_here + fragments_here > 0;
+      entries += triangles_here;
+      fragments += fragments_here;
+    }
+    counters.tiles_touched = counters.tiles_touched.value_or(0) + touched;
+    counters.bin_entries = counters.bin_entries.value_or(0) + entries;
+    counters.binned_fragments = counters.binned_fragments.value_or(0) + fragments;
+  }
+
+  void count_rest(WorkCounters& counters) {
+    ScreenTriangles<float> screen(triangles().size());
+    screen.transform(triangles(), make_screen_transform(camera_, Fixed8::kDepthFunction), settings_.geometry,
+                     *execution_);
+    count_boxes<Fixed8>({screen.span(), settings_, tile_settings_.triangle_count}, counters);
+    if (ids_.size() > 0) count_visible(ids(), counters);
+    counters.hidden_entries = 0;
+    for (const auto& worker : workers_) *counters.hidden_entries += worker->scratch.hidden_entries;
+    const auto bytes_of = [](std::int64_t n, std::size_t size) {
+      return n * static_cast<std::int64_t>(size);
+    };
+    const std::int64_t streams = bytes_of(*counters.bin_entries, 10 * sizeof(std::uint32_t)) +
+                                 bytes_of(*counters.binned_fragments, 3 * sizeof(std::uint32_t));
+    counters.geometry_bytes = {bytes_of(tile_settings_.triangle_count, sizeof(Triangle)), streams};
+    counters.raster_bytes = {
+        streams + bytes_of(counters.visible_triangles.value_or(0), sizeof(Triangle)),
+        bytes_of(static_cast<std::int64_t>(settings_.pixels()), sizeof(std::uint32_t) + sizeof(float))};
+  }
+
   template <class Stage>
   static double timed(Stage stage) {
     const auto begin = std::chrono::steady_clock::now();
@@ -228,6 +277,7 @@ class FusedTiles final : public Renderer {
   Camera camera_;
   std::uint64_t permutation_seed_;
   std::size_t stream_budget_;
+  bool count_;
   std::unique_ptr<Execution> execution_;
   const TileLanes& lanes_;
   TileSettings tile_settings_;

@@ -712,8 +712,9 @@ float farthest_depth(const TilePixels& tile) {
 }
 
 /// Draws the triangles that are set up and empties their list.
-void draw_triangles(TileTriangles& triangles, bool front_to_back, TilePixels& tile,
-                    std::vector<std::uint64_t>& order) {
+void draw_triangles(TileScratch& scratch, bool front_to_back, TilePixels& tile) {
+  TileTriangles& triangles = scratch.triangles;
+  std::vector<std::uint64_t>& order = scratch.order;
   if (!front_to_back) {
     for (std::size_t i = 0; i < triangles.size; ++i) draw_triangle(triangles, i, tile);
     triangles.size = 0;
@@ -735,7 +736,10 @@ void draw_triangles(TileTriangles& triangles, bool front_to_back, TilePixels& ti
   float farthest = std::numeric_limits<float>::infinity();
   std::int64_t drawn = 0;
   const auto draw = [&](std::size_t i) {
-    if (triangles.nearest[i] > farthest) return;
+    if (triangles.nearest[i] > farthest) {
+      ++scratch.hidden_entries;
+      return;
+    }
     draw_triangle(triangles, i, tile);
     drawn += box_area(i);
     if (drawn < area) return;
@@ -847,9 +851,9 @@ void draw(const TileTask& task, const TileSettings& settings, TileScratch& scrat
     for (auto block = front_end->triangles.blocks(task.tile); block != nullptr; block = block->next) {
       set_up(*block, settings, tile, triangles);
       if (triangles.size >= TileTriangles::kSize)
-        draw_triangles(triangles, settings.techniques.front_to_back, tile, scratch.order);
+        draw_triangles(scratch, settings.techniques.front_to_back, tile);
     }
-  draw_triangles(triangles, settings.techniques.front_to_back, tile, scratch.order);
+  draw_triangles(scratch, settings.techniques.front_to_back, tile);
   for (const FrontEnd* front_end : task.front_ends)
     for (auto block = front_end->small_triangles.blocks(task.tile); block != nullptr; block = block->next)
       draw_small(*block, settings, tile);

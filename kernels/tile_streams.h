@@ -47,6 +47,13 @@ class TileStreams {
     return *last;
   }
 
+  /// Entries of a tile's stream.
+  std::int64_t entries(std::int64_t tile) const {
+    std::int64_t sum = 0;
+    for (const Block* block = blocks(tile); block != nullptr; block = block->next) sum += block->size;
+    return sum;
+  }
+
   std::int64_t used_blocks() const { return used_; }
   /// Blocks that room() can still take.
   std::int64_t spare_blocks() const { return capacity_ - used_; }

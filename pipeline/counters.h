@@ -52,7 +52,11 @@ struct WorkCounters {
   std::optional<std::int64_t> visible_triangles;  ///< that some pixel shows
   std::optional<std::int64_t> tiles;              ///< cells of the bins: tiles, rows or bands
   std::optional<std::int64_t> tiles_touched;      ///< that some triangle's box touches
-  std::optional<std::int64_t> bin_entries;        ///< pairs of a triangle and a cell that its box touches
+  /// Fragments that were binned in place of their triangles.
+  std::optional<std::int64_t> binned_fragments;
+  std::optional<std::int64_t> bin_entries;  ///< pairs of a triangle and a cell that its box touches
+  /// Of these, entries whose triangle lies wholly behind what the tile shows, so that they were left out.
+  std::optional<std::int64_t> hidden_entries;
   std::optional<std::int64_t> merges;  ///< keys of private buffers that were compared with the frame's
   std::optional<StageBytes> clear_bytes, geometry_bytes, raster_bytes, resolve_bytes;
 };

@@ -9,6 +9,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -87,10 +88,20 @@ struct Visibility {
   typename Mode::Key& at(std::int64_t x, std::int64_t y) { return row(y)[x]; }
 };
 
-/// Seconds per stage.
+/// Seconds per stage; empty where a kernel has no such stage, because another one does its work.
 struct StageSeconds {
-  double clear = 0, geometry = 0, raster = 0, resolve = 0;
-  double total() const { return clear + geometry + raster + resolve; }
+  std::optional<double> clear, geometry, raster, resolve;
+  double total() const {
+    return clear.value_or(0) + geometry.value_or(0) + raster.value_or(0) + resolve.value_or(0);
+  }
+
+  /// Adds stage by stage; what is empty in `other` stays as it is.
+  StageSeconds& operator+=(const StageSeconds& other) {
+    for (auto stage :
+         {&StageSeconds::clear, &StageSeconds::geometry, &StageSeconds::raster, &StageSeconds::resolve})
+      if (other.*stage) this->*stage = (this->*stage).value_or(0) + *(other.*stage);
+    return *this;
+  }
 };
 
 /// What one frame did, besides its picture.

@@ -81,6 +81,30 @@ class ScreenTriangles {
   std::vector<GeometryCounts> counts_;
 };
 
+/// Counts the boxes of screen triangles and the samples in them.
+template <NumericMode Mode>
+void count_boxes(const StagedTriangles<Mode>& triangles, WorkCounters& counters) {
+  SizeClasses sizes;
+  std::int64_t samples = 0;
+  for (std::int64_t i = 0; i < triangles.size(); ++i) {
+    if (triangles.triangles[static_cast<std::size_t>(i)].id < 0) continue;
+    const PixelBox box = triangles.prepare(i).box;
+    sizes.add(box.x1 - box.x0, box.y1 - box.y0);
+    if (!box.empty()) samples += std::int64_t{box.x1 - box.x0} * (box.y1 - box.y0);
+  }
+  counters.sizes = sizes;
+  counters.samples_in_boxes = samples;
+}
+
+/// Counts the pixels that show a triangle, by Renderer::ids(), and those triangles.
+inline void count_visible(const std::vector<std::int32_t>& ids, WorkCounters& counters) {
+  std::vector<std::int32_t> shown;
+  std::copy_if(ids.begin(), ids.end(), std::back_inserter(shown), [](std::int32_t id) { return id >= 0; });
+  counters.covered_pixels = static_cast<std::int64_t>(shown.size());
+  std::sort(shown.begin(), shown.end());
+  counters.visible_triangles = std::unique(shown.begin(), shown.end()) - shown.begin();
+}
+
 /// Renderer for a staged strategy: `Strategy` has
 ///   void draw(const StagedTriangles<Mode>&, Visibility<Mode>, Execution&)
 ///   std::size_t bytes() const    memory of its own, if it has any
@@ -191,8 +215,8 @@ class FrameRenderer final : public Renderer {
       counters.edge_tests = calls_.edges;
       counters.fragments_passed = calls_.keys;
     }
-    count_boxes(counters);
-    count_visible(counters);
+    count_boxes(staged(), counters);
+    count_visible(ids(), counters);
     const auto bytes_of = [](std::int64_t n, std::size_t size) {
       return n * static_cast<std::int64_t>(size);
     };
@@ -207,34 +231,6 @@ class FrameRenderer final : public Renderer {
                               bytes_of(pixels, sizeof(std::uint32_t) + sizeof(float))};
     if constexpr (requires { strategy_.count(counters); }) strategy_.count(counters);
     return counters;
-  }
-
-  void count_boxes(WorkCounters& counters) const {
-    SizeClasses sizes;
-    std::int64_t samples = 0;
-    const StagedTriangles<Mode> triangles = staged();
-    for (std::int64_t i = 0; i < triangles.size(); ++i) {
-      if (triangles.triangles[static_cast<std::size_t>(i)].id < 0) continue;
-      const PixelBox box = triangles.prepare(i).box;
-      sizes.add(box.x1 - box.x0, box.y1 - box.y0);
-      if (!box.empty()) samples += std::int64_t{box.x1 - box.x0} * (box.y1 - box.y0);
-    }
-    counters.sizes = sizes;
-    counters.samples_in_boxes = samples;
-  }
-
-  void count_visible(WorkCounters& counters) const {
-    std::vector<bool> seen(scene_.model.triangles.size());
-    std::int64_t covered = 0, visible = 0;
-    for (std::size_t i = 0; i < settings_.pixels(); ++i) {
-      if (keys_[i] == Mode::kClear) continue;
-      ++covered;
-      auto&& is_known = seen[Mode::rank(keys_[i])];  // ranks are as many as triangles
-      visible += !is_known;
-      is_known = true;
-    }
-    counters.covered_pixels = covered;
-    counters.visible_triangles = visible;
   }
 
   template <class Stage>

@@ -99,7 +99,7 @@ WORK = {"triangles": WHOLE, "drawn": WHOLE, "pieces": WHOLE, "rejected": dict, "
         "fragments_tested": WHOLE, "fragments_covered": WHOLE, "covered_pixels": WHOLE, "bytes": WHOLE, "counted": (dict, NULL)}
 COUNTED = {"sizes": (dict, NULL), "bytes": dict} | dict.fromkeys(
     ["samples_in_boxes", "fragments_tested", "edge_tests", "fragments_passed", "covered_pixels", "visible_triangles", "tiles", "tiles_touched",
-     "bin_entries", "merges"], (WHOLE, NULL))
+     "bin_entries", "hidden_entries", "binned_fragments", "merges"], (WHOLE, NULL))
 EVENTS = ["cycles", "instructions", "branches", "branch_misses", "l1d_read_misses", "llc_misses", "dtlb_read_misses", "task_clock",
           "context_switches", "page_faults"]
 REJECTED = dict.fromkeys(["non_finite", "zero_area", "behind_near", "beyond_far", "off_screen", "back_facing"], WHOLE)
@@ -152,7 +152,7 @@ def test_counters_are_those_of_the_specification(study: Study) -> None:
         assert c["samples_in_boxes"] == work["fragments_tested"] and c["covered_pixels"] == work["covered_pixels"]
         if c["fragments_passed"] is not None:
             assert c["fragments_passed"] == work["fragments_covered"]
-        assert (c["bin_entries"] is None) == (r["config"]["kernel"] not in ("row_parallel", "tile_parallel", "tile_simd", "scanline"))
+        assert (c["bin_entries"] is None) == (r["config"]["kernel"] not in ("row_parallel", "tile_parallel", "tile_simd", "fused_tiles", "scanline"))
         assert (c["merges"] is None) == (r["config"]["kernel"] != "triangle_private")
         assert c["bytes"]["geometry"]["read"] == 36 * work["triangles"]
     assert any(r["work"]["counted"]["fragments_passed"] is not None for r in counted)
