@@ -153,6 +153,20 @@ TEST(Buffers, ThatDoNotFitThrowAndStayAsTheyWere) {
   EXPECT_EQ(buffer[3], 1);
 }
 
+TEST(Buffers, OfHugePagesBeginOnOne) {
+  constexpr std::size_t kHugePage = std::size_t{2} << 20;
+  for (const std::size_t bytes : {kHugePage, kHugePage + 1, 5 * kHugePage - 4096}) {
+    Buffer<char> buffer(bytes, "a buffer", Pages::kHuge);
+    EXPECT_EQ(reinterpret_cast<std::uintptr_t>(buffer.data()) % kHugePage, 0u);
+    buffer[0] = 'a';
+    buffer[bytes - 1] = 'z';
+    EXPECT_EQ(buffer[bytes / 2], 0);
+  }
+  Buffer<char> small(100, "a small one", Pages::kHuge);
+  small[99] = 'z';
+  EXPECT_EQ(small[98], 0);
+}
+
 TEST(FunctionRefs, CallWhatTheyWereMadeOf) {
   int sum = 0;
   auto add = [&sum](int value) { return sum += value; };

@@ -101,5 +101,35 @@ TEST(GeometryLanesOfOneCall, LeaveWhatHasNoLane) {
   EXPECT_EQ(transform_in_lanes(triangles.data(), 7, 0, transform, options, slots.data(), 0, counts) >> 4, 7u);
 }
 
+TEST(ScreenBatches, HoldWhatTheArrayHolds) {
+  const auto triangles = all_fates();
+  const ScreenTransform transform = make_screen_transform(plain_camera(kSide, kSide));
+  constexpr std::size_t kSize = ScreenBatch<float>::kSize;
+  ASSERT_GT(triangles.size(), 20u);
+  for (const Isa isa : all_isas()) {
+    if (!is_supported(isa)) continue;
+    for (const std::size_t n : {std::size_t{0}, std::size_t{5}, std::min(kSize, triangles.size())}) {
+      const std::span<const Triangle> some(triangles.data(), n);
+      const GeometryOptions options{.isa = isa};
+      std::vector<ScreenTriangle<float>> slots(n), extra, batch_extra;
+      ScreenBatch<float> batch;
+      GeometryCounts counts, batch_counts;
+      transform_triangles<float>(some, 7, transform, options, slots.data(), extra, counts);
+      transform_triangles(some, 7, transform, options, batch, batch_extra, batch_counts);
+      EXPECT_EQ(batch_counts.pieces, counts.pieces);
+      EXPECT_EQ(batch_extra.size(), extra.size());
+      for (std::size_t i = 0; i < kSize; ++i) {
+        ASSERT_EQ(batch.ids[i], i < n ? slots[i].id : -1) << to_string(isa) << ' ' << i;
+        if (batch.ids[i] < 0) continue;
+        for (int corner = 0; corner < 3; ++corner) {
+          EXPECT_EQ(batch.x[corner][i], slots[i].x[corner]);
+          EXPECT_EQ(batch.y[corner][i], slots[i].y[corner]);
+          EXPECT_EQ(batch.d[corner][i], slots[i].d[corner]);
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace rasterbench

@@ -46,10 +46,10 @@ def test_it_measures_and_prints_the_table(checkout: Path) -> None:
     done = speed(checkout, *QUICK)
     assert done.returncode == 0, done.stderr
     found = records(checkout / "results/speed")
-    kernels = [r for r in found if r["config"]["kernel"] == "tile_simd"]
+    kernels = [r for r in found if r["config"]["kernel"] == "fused_tiles"]
     assert kernels and {r["config"]["fill"] for r in kernels} == {"top-left"} and {r["config"]["numeric"] for r in kernels} == {"fixed_8"}
     assert json.loads((checkout / "results/speed/context.json").read_text())["study"]["sampling"]["launches"] == 3
-    assert "tile_simd, fixed_8, fill top-left, openmp dynamic" in done.stdout and "no class: teapot:triangles=300 64x48" in done.stdout
+    assert "fused_tiles, fixed_8, fill top-left, openmp dynamic" in done.stdout and "no class: teapot:triangles=300 64x48" in done.stdout
     with (checkout / "results/speed/speed.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert [row["id"] for row in rows] == [r["id"] for r in kernels]
