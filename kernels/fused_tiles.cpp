@@ -63,7 +63,10 @@ class FusedTiles final : public Renderer {
               .needs;
     order_.resize(batches_.size());
     std::iota(order_.begin(), order_.end(), 0u);
-    if (permutation_seed_ != 0) shuffle(order_.data(), order_.size(), Random(permutation_seed_));
+    if (permutation_seed_ != 0) {  // the batches here, the triangles of each as it is taken
+      Random random(permutation_seed_);
+      for (std::size_t i = order_.size(); i > 1; --i) std::swap(order_[i - 1], order_[random.bits() % i]);
+    }
     for (std::unique_ptr<Worker>& worker : workers_) {
       worker = std::make_unique<Worker>(tile_settings_.grid);
       worker->scratch.isa = settings_.geometry.isa;
@@ -144,9 +147,19 @@ class FusedTiles final : public Renderer {
 
   std::span<const Triangle> triangles() const { return scene_.model.triangles; }
 
-  template <class T>
-  static void shuffle(T* elements, std::size_t size, Random random) {
-    for (std::size_t i = size; i > 1; --i) std::swap(elements[i - 1], elements[random.bits() % i]);
+  static void permute(ScreenBatch<float>& screen, Random random) {
+    const auto get = [&](std::size_t i) {
+      return ScreenTriangle<float>{{screen.x[0][i], screen.x[1][i], screen.x[2][i]},
+                                   {screen.y[0][i], screen.y[1][i], screen.y[2][i]},
+                                   {screen.d[0][i], screen.d[1][i], screen.d[2][i]},
+                                   screen.ids[i]};
+    };
+    for (std::size_t i = kBatch; i > 1; --i) {
+      const std::size_t other = random.bits() % i;
+      const auto triangle = get(i - 1);
+      screen.set(i - 1, get(other));
+      screen.set(other, triangle);
+    }
   }
 
   /// Transforms batches into the streams until all are done or no room is left; whether all are.
@@ -176,6 +189,7 @@ class FusedTiles final : public Renderer {
     transform_triangles(triangles().subspan(first, std::min(kBatch, triangles().size() - first)),
                         static_cast<std::int32_t>(first), transform, settings_.geometry, worker.screen,
                         worker.extra, batch.counts);
+    if (permutation_seed_ != 0) permute(worker.screen, Random(permutation_seed_ + number));
     if (batch.parts_done == 0 && !append(worker.screen, worker)) return false;
     batch.parts_done = std::max<std::size_t>(batch.parts_done, 1);
     for (std::size_t begin = 0, part = 1; begin < worker.extra.size(); begin += kBatch, ++part) {
