@@ -20,19 +20,10 @@
 #include "pipeline/counters.h"
 #include "pipeline/geometry.h"
 #include "pipeline/needs.h"
+#include "pipeline/techniques.h"
 #include "scene/scene.h"
 
 namespace rasterbench {
-
-/// What makes a frame fast and never changes its picture: each can be switched off, to see what it gives.
-struct Techniques {
-  bool fragments = true;      ///< tiny triangles are sampled where they are transformed
-  bool front_to_back = true;  ///< large triangles of a tile in order of depth; what is hidden is left out
-  bool streaming = true;      ///< colours and depths bypass the caches on their way to memory
-  bool huge_pages = true;     ///< buffers lie in pages of 2 MiB where the system has them
-
-  bool operator==(const Techniques&) const = default;
-};
 
 /// Everything that the picture depends on besides the scene and the numeric mode.
 struct FrameSettings {
