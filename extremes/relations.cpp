@@ -127,6 +127,11 @@ Finding judge_executions(const DrawnCase& drawn, const Picture& specification) {
     setup.settings.geometry.isa = isa;
     check(setup, to_string(isa));
   }
+  for (const TechniqueInfo& technique : technique_infos()) {
+    RendererSetup setup = plain;
+    setup.settings.techniques.*technique.switched = false;
+    check(setup, "techniques " + to_string(setup.settings.techniques));
+  }
   for (const Schedule& schedule : schedules()) {
     RendererSetup setup = plain;
     setup.execution = {.backend = schedule.backend,

@@ -158,10 +158,12 @@ class FrameRenderer final : public Renderer {
       }
     });
     report_.raster_tally.assign(execution_->tally().begin(), execution_->tally().end());
+    // Without vectors there are no stores past the caches: a block of its own would be one more copy.
+    const bool streaming = settings_.techniques.streaming && settings_.geometry.isa != Isa::kBaseline;
     report_.seconds.resolve = timed([&] {
       execution_->uniform_loop(settings_.height, [&](std::int64_t y, int) {
         resolve_row<Mode>(visibility.row(y), width, scene_, settings_.tie, depth_map_, settings_.geometry.isa,
-                          colours_.data() + y * width, depths_.data() + y * width);
+                          colours_.data() + y * width, depths_.data() + y * width, streaming);
       });
     });
     report_.counts = screen_.counts();

@@ -7,6 +7,7 @@
 #include "numeric/mode.h"
 #include "pipeline/frame.h"
 #include "pipeline/shade_lanes.h"
+#include "pipeline/stream_lanes.h"
 #include "scene/model.h"
 #include "scene/parameters.h"
 
@@ -34,15 +35,18 @@ struct PixelRuns {
 };
 
 /// Resolves row y: reads keys, writes colours and depths, `width` of each. A triangle is shaded once per run
-/// of its pixels. `map` takes the mode's depth values to d.
+/// of its pixels. `map` takes the mode's depth values to d. `streaming`: past the caches, a block at a time.
 template <NumericMode Mode>
 void resolve_row(const typename Mode::Key* keys, int width, const Scene& scene, TieRule tie,
-                 const DepthMap& map, Isa isa, std::uint32_t* colours, float* depths) {
+                 const DepthMap& map, Isa isa, std::uint32_t* colours, float* depths,
+                 bool streaming = false) {
   const auto& triangles = scene.model.triangles;
   const auto count = static_cast<std::int64_t>(triangles.size());
   const std::uint32_t background = pack_rgba(scene.parameters.background);
   const std::uint32_t empty = Mode::rank(Mode::kClear);  // no triangle's
   PixelRuns runs;
+  alignas(64) std::uint32_t block_colours[PixelRuns::kBlock];
+  alignas(64) float block_depths[PixelRuns::kBlock];
   for (int first = 0; first < width; first += PixelRuns::kBlock) {
     const int end = std::min(width, first + PixelRuns::kBlock);
     runs.count = 0;
@@ -63,10 +67,17 @@ void resolve_row(const typename Mode::Key* keys, int width, const Scene& scene, 
     runs.begin[runs.count] = end;
     shade_in_lanes(triangles, {runs.ids, shaded}, scene.parameters.object, runs.shaded, isa);
     for (std::size_t i = 0; i < shaded; ++i) runs.colours[runs.run_of[i]] = runs.shaded[i];
+    std::uint32_t* const to_colours = streaming ? block_colours : colours + first;
+    float* const to_depths = streaming ? block_depths : depths + first;
     for (int run = 0; run < runs.count; ++run)
-      std::fill(colours + runs.begin[run], colours + runs.begin[run + 1], runs.colours[run]);
-    for (int x = first; x < end; ++x) depths[x] = Mode::output_depth(keys[x], map);
+      std::fill(to_colours + (runs.begin[run] - first), to_colours + (runs.begin[run + 1] - first),
+                runs.colours[run]);
+    for (int x = first; x < end; ++x) to_depths[x - first] = Mode::output_depth(keys[x], map);
+    if (streaming)
+      stream_pixels(to_colours, to_depths, static_cast<std::size_t>(end - first), colours + first,
+                    depths + first, isa);
   }
+  if (streaming) flush_streams();
 }
 
 }  // namespace rasterbench

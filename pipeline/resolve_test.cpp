@@ -129,6 +129,14 @@ TYPED_TEST(ResolveRow, MapsKeysToColoursAndDepths) {
   EXPECT_EQ(colours, (std::vector<std::uint32_t>{b, of[0], of[0], of[1], b, b, of[2], of[0]}));
   expect_depths(got_depths);
 
+  // Past the caches: the same bits.
+  std::vector<std::uint32_t> streamed_colours(keys.size());
+  std::vector<float> streamed_depths(keys.size(), -7.0f);
+  resolve_row<TypeParam>(keys.data(), width, scene, TieRule::kFirst, map, best_isa(), streamed_colours.data(),
+                         streamed_depths.data(), /*streaming=*/true);
+  EXPECT_EQ(streamed_colours, colours);
+  EXPECT_EQ(streamed_depths, got_depths);
+
   // The later triangle wins ties: rank r is triangle 2 - r.
   resolve_row<TypeParam>(keys.data(), width, scene, TieRule::kLast, map, best_isa(), colours.data(),
                          got_depths.data());
@@ -145,6 +153,31 @@ TYPED_TEST(ResolveRow, WritesNoMoreThanItsRow) {
   EXPECT_EQ(colours, (std::array<std::uint32_t, 2>{rgba(0, 0, 0), 7}));
   EXPECT_NEAR(depths[0], 0.5, 0.5 * TypeParam::kInfo.numbers.depth_step);
   EXPECT_EQ(depths[1], 7);
+}
+
+TYPED_TEST(ResolveRow, StreamsRowsOfSeveralBlocksToTheBit) {
+  std::vector<typename TypeParam::Key> keys;
+  for (std::uint32_t i = 0; i < 3 * PixelRuns::kBlock + 5; ++i)
+    keys.push_back(i % 7 < 2 ? TypeParam::kClear
+                             : key_of<TypeParam>(static_cast<float>(i % 64) / 64, i / 5 % 3));
+  const int width = static_cast<int>(keys.size());
+  const Scene scene = TestFixture::scene();
+  const DepthMap map = map_of(TypeParam::kDepthFunction);
+  for (const std::size_t offset : {0, 1, 5}) {  // rows of an odd width begin anywhere
+    std::vector<std::uint32_t> colours[2];
+    std::vector<float> depths[2];
+    for (const bool streaming : {false, true}) {
+      colours[streaming].assign(keys.size() + offset + 1, 7);
+      depths[streaming].assign(keys.size() + offset + 1, 7);
+      resolve_row<TypeParam>(keys.data(), width, scene, TieRule::kFirst, map, best_isa(),
+                             colours[streaming].data() + offset, depths[streaming].data() + offset,
+                             streaming);
+    }
+    EXPECT_EQ(colours[0], colours[1]);
+    EXPECT_EQ(depths[0], depths[1]);
+    EXPECT_EQ(colours[1].back(), 7u);
+    EXPECT_EQ(depths[1].back(), 7.0f);
+  }
 }
 
 TYPED_TEST(ResolveRow, ASceneWithoutTrianglesIsBackground) {

@@ -1,0 +1,64 @@
+#include "pipeline/stream_lanes.h"
+
+#include <algorithm>
+
+#include "base/isa_dispatch.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "pipeline/stream_lanes.cpp"
+#include <hwy/foreach_target.h>
+// After foreach_target.h:
+#include <hwy/cache_control.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace rasterbench {
+namespace HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+template <class T>
+HWY_INLINE void stream_row(const T* from, std::size_t n, T* to) {
+  constexpr hn::ScalableTag<T> kVector;
+  const std::size_t lanes = hn::Lanes(kVector);
+  const std::size_t beyond = reinterpret_cast<std::uintptr_t>(to) / sizeof(T) % lanes;  // a vector's start
+  std::size_t i = std::min(n, (lanes - beyond) % lanes);
+  std::copy_n(from, i, to);
+  for (; i + lanes <= n; i += lanes) hn::Stream(hn::LoadU(kVector, from + i), kVector, to + i);
+  std::copy_n(from + i, n - i, to + i);
+}
+
+void stream(const std::uint32_t* colours, const float* depths, std::size_t n, std::uint32_t* to_colours,
+            float* to_depths) {
+  stream_row(colours, n, to_colours);
+  stream_row(depths, n, to_depths);
+}
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace rasterbench
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace rasterbench {
+namespace {
+
+HWY_EXPORT(stream);
+
+}  // namespace
+
+void stream_pixels(const std::uint32_t* colours, const float* depths, std::size_t n,
+                   std::uint32_t* to_colours, float* to_depths, Isa isa) {
+  if (isa == Isa::kBaseline) {
+    std::copy_n(colours, n, to_colours);
+    std::copy_n(depths, n, to_depths);
+    return;
+  }
+  RASTERBENCH_DISPATCH(stream, isa)(colours, depths, n, to_colours, to_depths);
+}
+
+void flush_streams() { hwy::FlushStream(); }
+
+}  // namespace rasterbench
+#endif  // HWY_ONCE
