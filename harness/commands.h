@@ -44,6 +44,7 @@ struct DrawOptions {
   int tile = 64;
   std::string generality = "minimal";
   std::string isa = "best";
+  std::string techniques = "all";
 };
 
 /// The execution that the options ask for; throws InputError.

@@ -44,6 +44,7 @@ Json explain_model(const ExplainOptions& options, const DrawOptions& draw_option
   point.tile = settings.tile;
   point.generality = settings.generality;
   point.isa = settings.geometry.isa;
+  point.techniques = settings.techniques;
   find_schedule(point.execution);
   const Scene scene = open_scene(options.model, options.scene_file);
   point.width = draw_options.size.empty() ? scene.parameters.width : settings.width;

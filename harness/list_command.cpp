@@ -25,6 +25,7 @@ Json list_kernels() {
                     {"synchronisation", info.synchronisation},
                     {"work", info.work},
                     {"has_tiles", info.has_tiles},
+                    {"techniques", to_string(info.techniques)},
                     {"numerics", numerics},
                     {"not_in", left_out}});
   }
@@ -115,6 +116,18 @@ Json list_isas() {
   return list;
 }
 
+Json list_techniques() {
+  Json list = Json::array();
+  for (const TechniqueInfo& info : technique_infos()) {
+    Json had_by = Json::array();
+    for (const Kernel& kernel : kernels())
+      if (!kernel.info().hidden && kernel.info().techniques.*info.switched)
+        had_by.push_back(kernel.info().name);
+    list.push_back({{"name", info.name}, {"meaning", info.meaning}, {"kernels", had_by}});
+  }
+  return list;
+}
+
 Json list_scenes() {
   Json list = Json::array();
   for (const Generator& generator : generators()) {
@@ -179,10 +192,12 @@ void add_list_command(CLI::App& app) {
   const auto what = std::make_shared<std::string>();
   const auto json = std::make_shared<bool>(false);
   static const std::map<std::string, Json (*)()> kLists{
-      {"kernels", list_kernels},   {"peers", list_peers},         {"numerics", list_numerics},
-      {"backends", list_backends}, {"schedules", list_schedules}, {"isas", list_isas},
-      {"scenes", list_scenes},     {"studies", list_studies}};
-  command->add_option("WHAT", *what, "kernels, peers, numerics, backends, schedules, isas, scenes or studies")
+      {"kernels", list_kernels},       {"peers", list_peers},         {"numerics", list_numerics},
+      {"backends", list_backends},     {"schedules", list_schedules}, {"isas", list_isas},
+      {"techniques", list_techniques}, {"scenes", list_scenes},       {"studies", list_studies}};
+  command
+      ->add_option("WHAT", *what,
+                   "kernels, peers, numerics, backends, schedules, isas, techniques, scenes or studies")
       ->required();
   command->add_flag("--json", *json, "an array of objects that have a \"name\"");
   command->callback([what, json] {

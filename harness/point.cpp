@@ -34,7 +34,19 @@ bool is_vectorised(const Point& point) {
   return mode != nullptr && mode->has_screen_triangles;
 }
 
+/// Every technique that could make a difference to the point.
+Techniques possible_techniques(const Point& point) {
+  if (is_peer(point)) return kNoTechniques;
+  Techniques techniques = find_kernel(point.kernel).info().techniques;
+  if (point.isa == Isa::kBaseline) techniques.streaming = false;  // its stores are vectors'
+  return techniques;
+}
+
 }  // namespace
+
+Techniques techniques_of(const Point& point) {
+  return common_techniques(point.techniques, possible_techniques(point));
+}
 
 SceneReference parse_scene_reference(const std::string& text) {
   const auto at = text.find('@');
@@ -60,6 +72,7 @@ FrameSettings Point::settings() const {
   settings.tile = tile;
   settings.generality = generality;
   settings.geometry.isa = isa;
+  settings.techniques = techniques_of(*this);
   return settings;
 }
 
@@ -92,6 +105,8 @@ std::string point_name(const Point& p) {
   if (p.cache != "warm") name += "/cache:" + p.cache;
   if (p.generality != Generality::kMinimal) name += "/generality:full";
   if (is_vectorised(p) && p.isa != best_isa()) name += fmt::format("/isa:{}", to_string(p.isa));
+  if (const Techniques techniques = techniques_of(p); techniques != possible_techniques(p))
+    name += "/techniques:" + to_string(techniques);
   return name;
 }
 
@@ -115,6 +130,7 @@ Json point_config(const Point& p) {
   config["output"] = "rgba8+f32";
   config["cache"] = p.cache;
   config["generality"] = kGeneralities[p.generality == Generality::kFull];
+  config["techniques"] = is_peer(p) ? Json() : Json(to_string(techniques_of(p)));
   return config;
 }
 
@@ -144,6 +160,7 @@ Point point_from_json(const Json& json) {
   p.tile = json.at("tile");
   p.cache = json.at("cache");
   p.generality = parse_generality(json.at("generality"), "generality");
+  p.techniques = is_peer(p) ? Techniques{} : parse_techniques(json.at("techniques"), "techniques");
   p.isa = is_vectorised(p) ? parse_isa(json.at("isa"), "isa") : Isa::kBaseline;
   return p;
 }

@@ -63,9 +63,14 @@ struct Point {
   std::string cache = "warm";  ///< warm, or cold: the caches are swept before each sample
   Generality generality = Generality::kMinimal;
   Isa isa = best_isa();
+  Techniques techniques = {};  ///< those that are asked for; see techniques_of()
 
   FrameSettings settings() const;
 };
+
+/// The techniques of a point that make a difference to it: of those that are asked for the ones that its
+/// kernel has and its instruction set can carry. None for peers.
+Techniques techniques_of(const Point& point);
 
 /// Whether a peer draws the point. Its kernel, numeric and backend are the peer's name; it has a scene, a
 /// size and threads, and the environment that these ask for, and of every other axis the value that the peer

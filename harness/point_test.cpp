@@ -42,6 +42,49 @@ TEST(Point, SurvivesJson) {
   EXPECT_FALSE(back.execution.chunk);
 }
 
+TEST(Point, KeepsTheTechniquesThatItsKernelHas) {
+  const auto with = [](const std::string& kernel, const std::string& techniques) {
+    Point point = sample_point();
+    point.kernel = kernel;
+    if (kernel == "fused_tiles") point.numeric = "fixed_8";
+    if (kernel == "ray_cast") point.numeric = "ray_cast";
+    point.techniques = parse_techniques(techniques, "x");
+    return point;
+  };
+  const auto config_of = [](const Point& point) { return point_config(point).at("techniques"); };
+  const bool has_vectors = best_isa() != Isa::kBaseline;
+  const std::string of_frame = has_vectors ? "streaming+huge_pages" : "huge_pages";
+
+  EXPECT_EQ(config_of(with("tile_parallel", "all")), of_frame);
+  EXPECT_EQ(config_of(with("tile_parallel", "all-fragments")), of_frame);
+  EXPECT_EQ(config_of(with("tile_parallel", "huge_pages")), "huge_pages");
+  EXPECT_EQ(config_of(with("tile_parallel", "fragments")), "none");
+  EXPECT_EQ(config_of(with("ray_cast", "all")), "none");
+  EXPECT_EQ(config_of(with("fused_tiles", "all-fragments-front_to_back")), of_frame);
+  EXPECT_EQ(config_of(with("fused_tiles", "all")), has_vectors ? "all" : "all-streaming");
+  EXPECT_TRUE(config_of(peer_point("llvmpipe", {}, 1, 1, 1)).is_null());
+
+  // What makes no difference makes no other point; in the name only what is missing.
+  EXPECT_EQ(point_name(with("tile_parallel", "all")), point_name(sample_point()));
+  EXPECT_EQ(point_name(with("tile_parallel", "all-fragments")), point_name(sample_point()));
+  EXPECT_EQ(point_name(with("ray_cast", "none")), point_name(with("ray_cast", "all")));
+  EXPECT_EQ(point_name(with("tile_parallel", "none")), point_name(sample_point()) + "/techniques:none");
+  EXPECT_TRUE(point_name(with("fused_tiles", "front_to_back")).ends_with("/techniques:front_to_back"));
+
+  // Stores past the caches are vectors'.
+  Point scalar = with("tile_parallel", "all");
+  scalar.isa = Isa::kBaseline;
+  EXPECT_EQ(config_of(scalar), "huge_pages");
+  EXPECT_EQ(point_name(scalar).find("techniques"), std::string::npos);
+
+  for (const char* techniques : {"all", "none", "all-fragments", "front_to_back"}) {
+    const Point point = with("fused_tiles", techniques);
+    const Point back = point_from_json(Json::parse(point_to_json(point).dump()));
+    EXPECT_EQ(back.settings().techniques, point.settings().techniques);
+    EXPECT_EQ(point_name(back), point_name(point));
+  }
+}
+
 TEST(Point, PeersHaveAProcessForEachNumberOfThreads) {
   const Point one = peer_point("llvmpipe", parse_scene_reference("teapot"), 64, 48, 1);
   const Point two = peer_point("llvmpipe", parse_scene_reference("teapot"), 64, 48, 2);

@@ -41,6 +41,7 @@ FrameSettings frame_settings_of(const DrawOptions& options) {
   settings.geometry.isa = parse_isa(options.isa, "--isa");
   if (!is_supported(settings.geometry.isa))
     throw InputError({.field = "--isa"}, fmt::format("this CPU has no {}", options.isa));
+  settings.techniques = parse_techniques(options.techniques, "--techniques");
   if (!options.size.empty()) std::tie(settings.width, settings.height) = parse_size(options.size, "--size");
   return settings;
 }
@@ -145,6 +146,12 @@ void add_point_options(CLI::App& command, DrawOptions& o) {
   command
       .add_option("--isa", o.isa,
                   "instruction set of the vectorised loops: baseline, sse4, avx2, avx512, or best")
+      ->capture_default_str();
+  command
+      .add_option(
+          "--techniques", o.techniques,
+          "all, none, names joined by '+', or all-NAME; those that the kernel lacks change nothing; see "
+          "`rasterbench list techniques`")
       ->capture_default_str();
 }
 

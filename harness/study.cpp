@@ -76,6 +76,7 @@ std::string comparison_of(const Point& point) {
   common.environment = {};
   common.tile = Point().tile;
   common.generality = Point().generality;
+  common.techniques = Point().techniques;
   return point_name(common);
 }
 

@@ -298,13 +298,15 @@ Sweep read_sweep(const toml::table& table, const std::string& file, const std::f
   reader.strings("generality", sweep.generalities,
                  [](const std::string& s) { return parse_generality(s, "generality"); });
   reader.strings("isa", sweep.isas, [](const std::string& s) { return parse_isa(s, "isa"); });
+  reader.strings("techniques", sweep.techniques,
+                 [](const std::string& s) { return parse_techniques(s, "techniques"); });
   reader.reject_unknown_keys("[[sweep]]");
 
   if (sweep.kernels.empty() && sweep.peers.empty())
     reader.fail(table, "kernel", "is missing from this [[sweep]], which has no peer either");
   if (sweep.kernels.empty())
     for (const char* axis : {"numeric", "fill", "near", "execution", "chunk", "binding", "wait_policy",
-                             "runtime", "tile", "cache", "generality"})
+                             "runtime", "tile", "cache", "generality", "techniques"})
       if (const toml::node* node = table.get(axis))
         reader.fail(*node, axis, "is an axis of kernels, of which this [[sweep]] has none");
   if (sweep.executions.empty() && !sweep.kernels.empty())
@@ -315,6 +317,7 @@ Sweep read_sweep(const toml::table& table, const std::string& file, const std::f
   if (sweep.tiles.empty()) sweep.tiles.push_back(64);
   if (sweep.generalities.empty()) sweep.generalities.push_back(Generality::kMinimal);
   if (sweep.isas.empty()) sweep.isas.push_back(best_isa());
+  if (sweep.techniques.empty()) sweep.techniques.push_back({});
   return sweep;
 }
 
@@ -407,12 +410,13 @@ void span_points(const Sweep& sweep, const std::map<std::string, Scene>& scenes,
                        execution.backend == "serial" ? std::vector<int>{1} : sweep.threads)
                     for (const Environment& environment : sweep.environments)
                       for (const std::string& cache : sweep.caches)
-                        for (const auto& [generality, isa] : of_geometry(sweep, numeric)) {
-                          Point point{scene,     width,       height, kernel, numeric,    fill, near_rule,
-                                      execution, environment, tile,   cache,  generality, isa};
-                          point.execution.threads = threads;
-                          visit(point);
-                        }
+                        for (const auto& [generality, isa] : of_geometry(sweep, numeric))
+                          for (const Techniques& techniques : sweep.techniques) {
+                            Point point{scene,     width,       height, kernel, numeric,    fill, near_rule,
+                                        execution, environment, tile,   cache,  generality, isa,  techniques};
+                            point.execution.threads = threads;
+                            visit(point);
+                          }
       for (const std::string& peer : sweep.peers)
         for (const int threads : sweep.threads) visit(peer_point(peer, scene, width, height, threads));
     }

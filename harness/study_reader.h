@@ -26,6 +26,7 @@ struct Sweep {
   std::vector<std::string> caches;
   std::vector<Generality> generalities;
   std::vector<Isa> isas;
+  std::vector<Techniques> techniques;
 };
 
 /// Name, question, seed and [sampling] of a study file, and its text; no points yet.

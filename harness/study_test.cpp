@@ -61,6 +61,30 @@ threads = [1, 1]
           "tile_parallel/f32/closed/clip/openmp:static,4/1", "tile_parallel/f32/closed/clip/openmp:auto/1"}));
 }
 
+TEST_F(StudyTest, TechniquesMultiplyTheKernelsThatHaveThem) {
+  const Study study = read(kSweep + R"(
+kernel = ["scanline", "fused_tiles"]
+numeric = "fixed_8"
+execution = "openmp:static"
+threads = 1
+techniques = ["none", "huge_pages", "huge_pages+fragments", "all-fragments"]
+isa = "baseline"
+)");
+  const std::string rest = std::string("/fixed_8/closed/clip/openmp:static/1") +
+                           (best_isa() == Isa::kBaseline ? "" : "/isa:baseline");
+  EXPECT_EQ(names(study),
+            (std::vector<std::string>{"scanline" + rest + "/techniques:none", "scanline" + rest,
+                                      "fused_tiles" + rest + "/techniques:none",
+                                      "fused_tiles" + rest + "/techniques:huge_pages",
+                                      "fused_tiles" + rest + "/techniques:fragments+huge_pages",
+                                      "fused_tiles" + rest + "/techniques:front_to_back+huge_pages"}));
+  for (const PlannedPoint& planned : study.points)
+    EXPECT_EQ(comparison_of(planned.point), comparison_of(study.points.front().point));
+  EXPECT_NE(error_of(kSweep + "kernel = \"scanline\"\ntechniques = \"streeming\"\n")
+                .find("techniques: techniques: unknown technique 'streeming'; did you mean 'streaming'?"),
+            std::string::npos);
+}
+
 TEST_F(StudyTest, PeersHaveSceneSizeAndThreadsOnly) {
   const Study study = read(kSweep + R"(
 kernel = "tile_parallel"

@@ -19,7 +19,7 @@ namespace {
 struct VerifyOptions {
   std::string model, scene_file;
   std::vector<std::string> kernels, numerics;
-  std::string size, fill = "closed", near_rule = "clip";
+  std::string size, fill = "closed", near_rule = "clip", techniques = "all";
   int threads = 0;
   bool oversubscribe = false;
   std::string difference, explain;
@@ -118,6 +118,7 @@ int verify_scene(const VerifyOptions& options, const std::string& model, Json& r
   settings.fill = parse_fill(options.fill, "--fill");
   settings.geometry.near_rule = parse_near(options.near_rule, "--near");
   settings.geometry.isa = best_isa();
+  settings.techniques = parse_techniques(options.techniques, "--techniques");
   std::pair<int, int> pixel{-1, -1};
   if (!options.explain.empty()) pixel = parse_pixel(options.explain, settings.width, settings.height);
 
@@ -200,6 +201,7 @@ int verify_scene(const VerifyOptions& options, const std::string& model, Json& r
 void check_options(VerifyOptions& options) {
   if (options.kernels.empty()) options.kernels = {"tile_parallel", "ray_cast"};
   for (const std::string& kernel : options.kernels) find_kernel(kernel);
+  parse_techniques(options.techniques, "--techniques");
   for (const std::string& name : options.numerics) available_mode(name, "--numeric");
   if (options.numerics.empty())
     for (const ModeInfo& mode : mode_infos())
@@ -235,6 +237,10 @@ void add_verify_command(CLI::App& app, Outcome& outcome) {
   command->add_option("--size", o->size, "WxH in pixels, each 1 to 65536 (default: the scene's)");
   command->add_option("--fill", o->fill, "closed or top-left")->capture_default_str();
   command->add_option("--near", o->near_rule, "clip at the near plane, or off")->capture_default_str();
+  command
+      ->add_option("--techniques", o->techniques,
+                   "techniques of the kernels: all, none, names joined by '+', or all-NAME")
+      ->capture_default_str();
   command->add_option("--threads", o->threads, "threads of kernels and judges (default: all CPUs)")
       ->check(CLI::Range(1, 65536));
   command->add_flag("--oversubscribe", o->oversubscribe, "allow more threads than CPUs");

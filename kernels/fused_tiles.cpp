@@ -30,6 +30,7 @@ constexpr KernelInfo kInfo{
     .synchronisation = "none: a worker fills streams of its own, an iteration owns its tile",
     .work = "T + tiles of all boxes + B, in vectors",
     .has_tiles = true,
+    .techniques = {},  // all
     .needs = "has its loops in the integers of fixed_8"};
 
 /// log2 of the side of the tiles: that of `tile` rounded down to a power of two from 8 to 128.

@@ -22,7 +22,8 @@ struct KernelInfo {
   std::string_view work;  ///< complexity: T triangles, P pixels of the image, B pixels of all bounding boxes
   bool tests_every_pixel = false;  ///< costs T x P edge tests, so that a study has to predict its time
   bool has_tiles = false;          ///< FrameSettings::tile matters to its speed
-  bool hidden = false;             ///< not listed: a canary
+  Techniques techniques = kFrameTechniques;  ///< those that it has: the others make no difference to it
+  bool hidden = false;                       ///< not listed: a canary
   /// What a numeric mode must have to suit, said of modes that do not.
   std::string_view needs = "needs a key of one 64-bit word, which this mode's depth does not fit";
 };

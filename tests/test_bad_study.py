@@ -38,9 +38,10 @@ tile = [64]
 cache = ["warm"]
 generality = ["minimal"]
 isa = ["best"]
+techniques = ["all"]
 """
 AXES = ["size", "kernel", "numeric", "fill", "near", "execution", "chunk", "threads", "binding", "wait_policy", "runtime", "tile", "cache",
-        "generality", "isa"]
+        "generality", "isa", "techniques"]
 
 
 @pytest.fixture
@@ -107,6 +108,10 @@ def test_the_study_is_good_before_it_is_spoilt(folder: Path) -> None:
     ("cache", 'cache = "hot"', ["cache: "]),
     ("generality", 'generality = "ful"', ["generality: ", "full"]),
     ("isa", 'isa = "avx51"', ["isa: ", "did you mean 'avx512'"]),
+    ("techniques", 'techniques = ["none", "streeming"]', ["techniques: ", "did you mean 'streaming'"]),
+    ("techniques", 'techniques = "all-hugepages"', ["techniques: ", "did you mean 'huge_pages'"]),
+    ("techniques", 'techniques = "none+streaming"', ["techniques: ", "'none' stands alone"]),
+    ("techniques", "techniques = true", ["techniques: ", "string"]),
     ("seed", "seed = -1", ["seed: ", "whole number from 0"]),
     ("seed", "seed = 1.5", ["seed: ", "whole number"]),
     ("target", "target = 0", ["target: ", "a number from"]),

@@ -11,7 +11,7 @@ import pytest
 
 from .program import CPUS, ROOT, read_dat, read_parameters, run
 
-WORDS = ["kernels", "numerics", "backends", "schedules", "isas", "scenes", "studies"]
+WORDS = ["kernels", "numerics", "backends", "schedules", "isas", "techniques", "scenes", "studies"]
 KERNELS = {"all_pixels", "bounding_box", "triangle_locks", "triangle_atomics", "triangle_private", "row_parallel", "tile_parallel", "scanline"}
 GENERATORS = ["teapot:triangles=500", "terrain:triangles=800,seed=3", "confetti:triangles=300,distribution=heavy,seed=2",
               "layers:triangles=200,depth=3,order=random"]
@@ -43,6 +43,15 @@ def test_kernels() -> None:
     for k in kernels.values():
         assert k["parallel_unit"] and k["synchronisation"] and k["work"] and k["numerics"]
     assert "f64" not in kernels["triangle_atomics"]["numerics"] and "64-bit" in kernels["triangle_atomics"]["not_in"]["f64"]
+
+
+def test_techniques_say_who_has_them() -> None:
+    techniques = {t["name"]: t for t in listed("techniques")}
+    assert list(techniques) == ["fragments", "front_to_back", "streaming", "huge_pages"] and all(t["meaning"] for t in techniques.values())
+    assert techniques["fragments"]["kernels"] == techniques["front_to_back"]["kernels"] == ["fused_tiles"]
+    assert set(techniques["streaming"]["kernels"]) == set(techniques["huge_pages"]["kernels"]) >= KERNELS | {"fused_tiles"}
+    has = {k["name"]: k["techniques"] for k in listed("kernels")}
+    assert has["fused_tiles"] == "all" and all(has[kernel] == "streaming+huge_pages" for kernel in KERNELS) and has.get("ray_cast", "none") == "none"
 
 
 def test_numerics_state_their_arithmetic_and_bound() -> None:

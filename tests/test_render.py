@@ -130,6 +130,30 @@ def test_every_instruction_set_draws_the_same_bits(kernel: str, numeric: str, cr
     assert [isa["name"] for isa in listed("isas") if isa["best"]] == [list(pictures)[-1]]
 
 
+@pytest.mark.parametrize("kernel", ["fused_tiles", "tile_simd", "scanline"])
+def test_every_technique_draws_the_same_bits(kernel: str, crossing: SmallScene, tmp_path: Path) -> None:
+    names = [technique["name"] for technique in listed("techniques")]
+    pictures = {}
+    for techniques in ["all", "none", *names, *(f"all-{name}" for name in names), "+".join(names[::-1])]:
+        # The rows of an odd width begin anywhere between two vectors.
+        render(crossing, tmp_path, "--kernel", kernel, "--numeric", "fixed_8", "--size", "1031x77", "--techniques", techniques)
+        pictures[techniques] = b"".join((tmp_path / f).read_bytes() for f in ("ids.npy", "depth.npy", "image.ppm"))
+    assert len(set(pictures.values())) == 1
+
+
+@pytest.mark.parametrize("command", ["render", "verify", "explain"])
+@pytest.mark.parametrize("techniques, words", [("streeming", ["did you mean 'streaming'"]), ("all-", ["unknown technique ''"]), ("", ["unknown technique ''"]),
+                                               ("all+streaming", ["'all' stands alone"]), ("streaming,huge_pages", ["unknown technique"])])
+def test_bad_techniques(command: str, techniques: str, words: list[str]) -> None:
+    refused(run(command, "teapot:triangles=300", "--techniques", techniques), "--techniques: ", *words)
+
+
+def test_verify_takes_techniques() -> None:
+    for techniques in ("none", "all"):
+        assert " FAILED" not in run("verify", "teapot:triangles=300", "--size", "64x48", "--kernel", "fused_tiles", "--numeric", "fixed_8",
+                                    "--techniques", techniques).ok().stdout
+
+
 def test_options_change_the_picture(crossing: SmallScene, tmp_path: Path) -> None:
     """Otherwise equal bits above would be a sign of options that are not read."""
     _, closed, plain = render(crossing, tmp_path)

@@ -65,7 +65,8 @@ def mixed(tmp_path_factory: pytest.TempPathFactory) -> Study:
                  sweep("tile_parallel", "serial", near="off", tile=[16, 32]),
                  sweep("scanline", "serial", cache=["warm", "cold"]),
                  sweep("bounding_box", "serial", generality=["minimal", "full"]),
-                 sweep(["tile_parallel", "tile_simd"], "serial", numeric="fixed_8", isa=ISAS))
+                 sweep(["tile_parallel", "tile_simd"], "serial", numeric="fixed_8", isa=ISAS),
+                 sweep(["scanline", "fused_tiles"], "serial", numeric="fixed_8", techniques=["none", "huge_pages+fragments", "all-streaming", "all"]))
 
 
 @pytest.fixture(params=["good", "mixed"])
@@ -79,7 +80,7 @@ NUMBER, TEXT, LIST, WHOLE = (int, float), str, list, int
 NULL = type(None)
 CONFIG = {"scene": TEXT, "scene_hash": TEXT, "size": LIST, "kernel": TEXT, "numeric": TEXT, "fill": TEXT, "near": TEXT, "backend": TEXT,
           "schedule": (TEXT, NULL), "chunk": (WHOLE, NULL), "threads": WHOLE, "binding": TEXT, "wait_policy": TEXT, "runtime": TEXT,
-          "tile": (WHOLE, NULL), "isa": TEXT, "output": TEXT, "cache": TEXT, "generality": TEXT}
+          "tile": (WHOLE, NULL), "isa": TEXT, "output": TEXT, "cache": TEXT, "generality": TEXT, "techniques": TEXT}
 RECORD = {"schema": WHOLE, "id": TEXT, "name": TEXT, "config": dict, "status": TEXT, "launches": LIST, "blocks": LIST, "frames_per_sample": WHOLE,
           "samples_ms": LIST, "stages_ms": dict, "median_ms": (*NUMBER, NULL), "interval_ms": (LIST, NULL), "p95_ms": (*NUMBER, NULL),
           "min_ms": (*NUMBER, NULL), "max_ms": (*NUMBER, NULL), "floor_ms": (*NUMBER, NULL), "stop": (TEXT, NULL), "verify": (dict, NULL), "work": (dict, NULL), "hardware": (dict, NULL),
@@ -145,7 +146,7 @@ def test_counters_are_those_of_the_specification(study: Study) -> None:
     counted = [r for r in study.records if r["status"] == "ok"]
     for r in counted:
         work, c = r["work"], r["work"]["counted"]
-        if r["config"]["kernel"] == "ray_cast":  # no screen triangles
+        if r["config"]["kernel"] in ("ray_cast", "fused_tiles"):  # no array of screen triangles
             assert c["sizes"] is None and c["fragments_tested"] is None
             continue
         assert sum(c["sizes"].values()) == work["pieces"]
@@ -175,13 +176,17 @@ def test_config_values(study: Study) -> None:
         c = r["config"]
         assert c["fill"] in ("closed", "top-left") and c["near"] in ("clip", "off") and c["cache"] in ("warm", "cold")
         assert c["output"] == "rgba8+f32" and len(c["size"]) == 2 and all(isinstance(side, int) for side in c["size"])
-        assert (c["schedule"] is None) == (c["backend"] == "serial") and (c["tile"] is None) == (c["kernel"] not in ("tile_parallel", "tile_simd"))
+        assert (c["schedule"] is None) == (c["backend"] == "serial") and (c["tile"] is None) == (c["kernel"] not in ("tile_parallel", "tile_simd", "fused_tiles"))
         schedule = c["backend"] + (f":{c['schedule']}" if c["schedule"] else "") + (f",{c['chunk']}" if c["chunk"] else "")
         parts = [c["scene"], f"{c['size'][0]}x{c['size'][1]}", c["kernel"], c["numeric"], c["fill"], c["near"], schedule, str(c["threads"])]
         for key, label, usual in (("binding", "binding", "none"), ("wait_policy", "wait", "default"), ("runtime", "runtime", "default"),
                                   ("tile", "tile", 64), ("cache", "cache", "warm"), ("generality", "generality", "minimal"), ("isa", "isa", ISAS[-1])):
             if c[key] not in (usual, None):
                 parts.append(f"{label}:{c[key]}")
+        vectors = c["isa"] != "baseline"  # without them there is no streaming
+        most = ("all" if vectors else "all-streaming") if c["kernel"] == "fused_tiles" else "streaming+huge_pages" if vectors else "huge_pages"
+        if c["techniques"] != most:
+            parts.append(f"techniques:{c['techniques']}")
         assert r["name"] == "/".join(parts)
 
 
@@ -344,6 +349,17 @@ def test_skipped_with_a_reason(axes: dict[str, Any], words: list[str], mixed: St
 def test_axes_that_run(axes: dict[str, Any], mixed: Study) -> None:
     (r,) = [r for r in mixed.where(**axes) if r["config"]["backend"] != "tbb"]
     assert r["status"] == "ok", r.get("reason")
+
+
+@pytest.mark.skipif(ISAS == ["baseline"], reason="streaming needs vectors")
+def test_a_point_keeps_the_techniques_of_its_kernel(mixed: Study) -> None:
+    """And what makes no difference makes no other point."""
+    for kernel, techniques in {"scanline": ["none", "huge_pages", "streaming+huge_pages"],
+                               "fused_tiles": ["none", "fragments+huge_pages", "all-streaming", "all"]}.items():
+        found = mixed.where(kernel=kernel, numeric="fixed_8", isa=ISAS[-1], cache="warm")
+        assert [r["config"]["techniques"] for r in found] == techniques
+        assert all(r["status"] == "ok" and r["verify"]["conforms"] for r in found)
+        assert len({r["id"] for r in found}) == len(techniques)
 
 
 def test_other_openmp_runtime(mixed: Study) -> None:
