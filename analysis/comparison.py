@@ -13,7 +13,7 @@ from .statistics import Comparison, Estimate
 # Two points are compared only if these are equal: same picture, same arithmetic, same region, same cache state.
 GROUP_AXES = ("scene", "scene_hash", "size", "numeric", "fill", "near", "output", "cache")
 # Always in a point's name: kernel, backend:schedule,chunk, threads. These only where a kernel has several values.
-EXTRA_AXES = ("isa", "tile", "binding", "wait_policy", "runtime", "generality")
+EXTRA_AXES = ("isa", "tile", "binding", "wait_policy", "runtime", "generality", "techniques")
 PEER_AXES = ("scene", "scene_hash", "size")  # what a peer shares with the groups that it is shown beside
 BASE_AXES = ("scene", "scene_hash", "size", "numeric", "fill", "near", "isa", "output", "cache")
 

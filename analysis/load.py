@@ -18,6 +18,7 @@ STAGES = ("clear", "geometry", "raster", "resolve")
 COUNTED = {"wrong", "exact_ties", "edge", "depth", "unexplained", "unbounded", "predicted", "wrong_on_snapped", "worst_distance_px",
            "max_depth_error_steps", "ambiguous", "edge_ties", "depth_ties", "errors", "false_positives", "false_negatives"}
 STATUSES = ("ok", "failed", "skipped")
+TECHNIQUES = ("fragments", "front_to_back", "streaming", "huge_pages")  # in the program's order
 PEERS = ("llvmpipe",)  # other programs that draw the same pictures; as a record's backend
 
 
@@ -52,6 +53,7 @@ class Config:
     runtime: str | None = None
     tile: int | str | None = None
     generality: str | None = None
+    techniques: str | None = None  # "all", "none", "all-NAME" or names joined by "+"; None of peers and in older records
 
     @property
     def is_peer(self) -> bool:
@@ -128,6 +130,18 @@ class Study:
 
 def is_whole(value: object) -> bool:
     return isinstance(value, int) and not isinstance(value, bool) and value > 0
+
+
+def technique_set(words: str) -> frozenset[str]:
+    """The techniques that a record's text stands for (harness/records.md)."""
+    if words in ("all", "none"):
+        return frozenset(TECHNIQUES if words == "all" else ())
+    without = words.startswith("all-")
+    names = words.removeprefix("all-").split("-" if without else "+")
+    unknown = [name for name in names if name not in TECHNIQUES]
+    if unknown:
+        raise ValueError(f"unknown technique {unknown[0]!r}")
+    return frozenset(TECHNIQUES).difference(names) if without else frozenset(names)
 
 
 def load(directory: Path) -> Study:
@@ -300,6 +314,11 @@ class _Reader:
         if config["schedule"] is not None:
             self.text(config, "schedule", "config.")
         known = {axis.name: config.get(axis.name) for axis in fields(Config)}
+        if known["techniques"] is not None:
+            try:
+                technique_set(self.text(config, "techniques", "config."))
+            except ValueError as error:
+                raise self.fail("config.techniques", str(error)) from None
         for key in ("scene_hash", "binding", "wait_policy", "runtime", "tile", "generality"):
             if isinstance(known[key], (list, dict)):  # a tile of [32, 32], say: kept as text, it is only a label
                 known[key] = json.dumps(known[key])

@@ -12,8 +12,8 @@ import jinja2
 import matplotlib
 from markupsafe import Markup
 
-from . import (__version__, checks, figures, findings, stage_efficiency, statistics, strategy_map, style, tables, text, trade,
-               trade_tables, trade_text, work, writing)
+from . import (__version__, checks, figures, findings, ladder, stage_efficiency, statistics, strategy_map, style, tables, text,
+               trade, trade_tables, trade_text, work, writing)
 from .captions import Caption
 from .comparison import Analysis
 from .figures.common import drawn_together
@@ -48,7 +48,7 @@ def write(analysis: Analysis, out: Path | None = None) -> Written:
             files |= {f"{drawing.name}.{kind}": content for kind, content in made.items()}
             uri = data_uri("image/png", made["png"]) if drawing.raster else data_uri("image/svg+xml", made["svg"])
             sections.setdefault(drawing.section, []).append(Embedded(drawing.name, number, uri, drawing.caption))
-    found = [t for module in (tables, trade_tables, strategy_map, work, stage_efficiency) for t in module.tables(analysis)]
+    found = [t for module in (tables, trade_tables, ladder, strategy_map, work, stage_efficiency) for t in module.tables(analysis)]
     for table in found:
         if table.section:
             sections.setdefault(table.section, [])  # a section may have tables and no figure

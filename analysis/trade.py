@@ -26,7 +26,7 @@ REFERENCE_MODE = "f32"
 PICTURE_AXES = tuple(axis for axis in GROUP_AXES if axis != "numeric")
 KIND_AXES = ("fill", "near", "output", "cache")
 # What two points must share for their ratio to be the price of the arithmetic alone; the instruction set where it can be.
-LIKE_AXES = ("kernel", "backend", "schedule", "chunk", "threads", "tile", "binding", "wait_policy", "runtime", "generality")
+LIKE_AXES = ("kernel", "backend", "schedule", "chunk", "threads", "tile", "binding", "wait_policy", "runtime", "generality", "techniques")
 
 
 @dataclass(eq=False)
