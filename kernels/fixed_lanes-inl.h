@@ -61,27 +61,31 @@ HWY_INLINE Integer end_pixel(Integer grid) {
   return hn::Add(hn::ShiftRight<8>(hn::Sub(grid, hn::Set(kIntegers, 128))), hn::Set(kIntegers, 1));
 }
 
-/// A corner of each lane's triangle: in 1/256 px, and its depth.
-struct LaneCorner {
-  Integer x, y;
+/// A corner of each lane's triangle, and its depth.
+template <class Coordinate>
+struct LaneCornerOf {
+  Coordinate x, y;
   Float d;
 };
+using LaneCorner = LaneCornerOf<Integer>;  // in 1/256 px
 
 /// sort_corners() of numeric/mode.h.
-HWY_INLINE void sort_corners(LaneCorner& a, LaneCorner& b) {
-  const auto before = [](Integer u, Integer v, auto otherwise)
+template <class Coordinate>
+HWY_INLINE void sort_corners(LaneCornerOf<Coordinate>& a, LaneCornerOf<Coordinate>& b) {
+  const auto before = [](Coordinate u, Coordinate v, auto otherwise)
                           HWY_ATTR { return hn::Or(hn::Lt(u, v), hn::And(hn::Eq(u, v), otherwise)); };
-  const auto depth_before = hn::RebindMask(kIntegers, hn::Le(a.d, b.d));
+  const auto depth_before = hn::RebindMask(hn::DFromV<Coordinate>(), hn::Le(a.d, b.d));
   const auto ordered = before(a.x, b.x, before(a.y, b.y, depth_before));
   const auto ordered_float = hn::RebindMask(kFloats, ordered);
-  const LaneCorner u = a, v = b;
+  const LaneCornerOf<Coordinate> u = a, v = b;
   a = {hn::IfThenElse(ordered, u.x, v.x), hn::IfThenElse(ordered, u.y, v.y),
        hn::IfThenElse(ordered_float, u.d, v.d)};
   b = {hn::IfThenElse(ordered, v.x, u.x), hn::IfThenElse(ordered, v.y, u.y),
        hn::IfThenElse(ordered_float, v.d, u.d)};
 }
 
-HWY_INLINE void sort_corners(LaneCorner (&c)[3]) {
+template <class Coordinate>
+HWY_INLINE void sort_corners(LaneCornerOf<Coordinate> (&c)[3]) {
   sort_corners(c[0], c[1]);
   sort_corners(c[1], c[2]);
   sort_corners(c[0], c[1]);

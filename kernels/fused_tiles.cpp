@@ -31,14 +31,18 @@ constexpr KernelInfo kInfo{
     .work = "T + tiles of all boxes + B, in vectors",
     .has_tiles = true,
     .techniques = {},  // all
-    .needs = "has its loops in the integers of fixed_8"};
+    .needs = "has its loops in the integers of fixed_8 and the floats of filtered"};
+
+/// Of both modes, whose screen triangles and keys are the same.
+constexpr DepthFunction kDepthFunction = Fixed8::kDepthFunction;
+static_assert(Filtered::kDepthFunction == kDepthFunction && Filtered::kClear == Fixed8::kClear);
 
 /// log2 of the side of the tiles: that of `tile` rounded down to a power of two from 8 to 128.
 int tile_shift(int tile) { return std::bit_width(static_cast<unsigned>(std::clamp(tile, 8, 128))) - 1; }
 
 class FusedTiles final : public Renderer {
  public:
-  explicit FusedTiles(const RendererSetup& setup)
+  FusedTiles(const RendererSetup& setup, std::string_view mode)
       : scene_(*setup.scene),
         settings_(checked(setup.settings)),
         camera_(sized_camera(scene_, settings_)),
@@ -46,7 +50,7 @@ class FusedTiles final : public Renderer {
         stream_budget_(setup.stream_budget),
         count_(setup.count),
         execution_(make_execution(setup.execution)),
-        lanes_(tile_lanes(settings_.geometry.isa)),
+        lanes_(tile_lanes(settings_.geometry.isa, mode)),
         tile_settings_{.grid = TileGrid(settings_.width, settings_.height, tile_shift(settings_.tile)),
                        .fill = settings_.fill,
                        .tie = settings_.tie,
@@ -58,10 +62,9 @@ class FusedTiles final : public Renderer {
         depths_(settings_.pixels(), "the depth buffer", settings_.pages()),
         ids_(setup.keeps_ids ? settings_.pixels() : 0, "the ids") {
     if (settings_.generality == Generality::kMinimal)
-      settings_.geometry.needs =
-          analyse_needs(triangles(), make_screen_transform(camera_, Fixed8::kDepthFunction),
-                        settings_.geometry.near_rule)
-              .needs;
+      settings_.geometry.needs = analyse_needs(triangles(), make_screen_transform(camera_, kDepthFunction),
+                                               settings_.geometry.near_rule)
+                                     .needs;
     order_.resize(batches_.size());
     std::iota(order_.begin(), order_.end(), 0u);
     if (permutation_seed_ != 0) {  // the batches here, the triangles of each as it is taken
@@ -166,7 +169,7 @@ class FusedTiles final : public Renderer {
   /// Transforms batches into the streams until all are done or no room is left; whether all are.
   bool fill_streams() {
     for (const auto& worker : workers_) worker->front_end.reset(tile_settings_.grid.tiles());
-    const ScreenTransform transform = make_screen_transform(camera_, Fixed8::kDepthFunction);
+    const ScreenTransform transform = make_screen_transform(camera_, kDepthFunction);
     for (;;) {
       std::atomic<bool> all_done = true;
       execution_->uniform_loop(static_cast<std::int64_t>(batches_.size()), [&](std::int64_t i, int worker) {
@@ -311,9 +314,12 @@ class FusedTiles final : public Renderer {
 std::vector<Kernel::Variant> variants() {
   std::vector<Kernel::Variant> all;
   for (const ModeInfo& mode : mode_infos()) {
-    if (mode.name == Fixed8::kInfo.name)
-      all.push_back(
-          {mode.name, [](const RendererSetup& setup) { return std::make_unique<FusedTiles>(setup); }, {}});
+    if (mode.name == Fixed8::kInfo.name || mode.name == Filtered::kInfo.name)
+      all.push_back({mode.name,
+                     [name = mode.name](const RendererSetup& setup) {
+                       return std::make_unique<FusedTiles>(setup, name);
+                     },
+                     {}});
     else
       all.push_back({mode.name, {}, kInfo.needs});
   }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <limits>
+#include <stdexcept>
 
 #include "base/isa_dispatch.h"
 #include "kernels/fragments.h"
@@ -18,6 +19,9 @@
 #include <hwy/highway.h>
 
 #include "kernels/fixed_lanes-inl.h"
+#include "kernels/tile_filtered-inl.h"
+#include "kernels/tile_fixed-inl.h"
+#include "kernels/tile_vectors-inl.h"
 
 #ifndef RASTERBENCH_TILE_LANES_ONCE
 #define RASTERBENCH_TILE_LANES_ONCE
@@ -100,6 +104,13 @@ void draw_one_by_one(const TriangleStreams::Block& block, std::size_t i, const S
   });
 }
 
+/// Whether entry i of a block covers a sample that its lane was not certain of. Out of line: it is rare.
+template <NumericMode Mode>
+[[gnu::noinline]] bool covers_exactly(const TriangleStreams::Block& block, std::size_t i,
+                                      const SampleGrid& grid, std::int32_t x, std::int32_t y) {
+  return covers<Mode>(Mode::prepare(triangle_of(block, i), grid, block.fields[9][i]), x, y);
+}
+
 /// Appends survivor i to a tile.
 void append(const FrontEnd::Survivors& from, std::size_t i, std::int64_t tile, TriangleStreams& streams) {
   TriangleStreams::Block& block = streams.room(tile, 1);
@@ -129,51 +140,7 @@ namespace rasterbench {
 namespace HWY_NAMESPACE {
 namespace {
 
-using Doubles = hn::ScalableTag<double>;
-using HalfIntegers = hn::Rebind<std::int32_t, Doubles>;  // as many as there are doubles in a vector
-constexpr Doubles kDoubles;
-constexpr HalfIntegers kHalfIntegers;
-using Double = hn::Vec<Doubles>;
-
-constexpr auto kWidth = static_cast<std::int32_t>(kLanes);
-
-HWY_INLINE Integer integer(std::int32_t value) { return hn::Set(kIntegers, value); }
-
-HWY_INLINE std::uint32_t bits_of(IntegerMask mask) {
-  std::uint8_t bytes[8] = {};
-  hn::StoreMaskBits(kIntegers, mask, bytes);
-  return bytes[0] | std::uint32_t{bytes[1]} << 8;  // at most 16 lanes
-}
-
-/// The pixels of the image in the lanes' boxes.
-struct LaneBox {
-  Integer x0, y0, x1, y1;
-
-  HWY_INLINE IntegerMask holds_a_sample() const { return hn::And(hn::Lt(x0, x1), hn::Lt(y0, y1)); }
-};
-
-HWY_INLINE LaneBox whole_box(const Integer (&x)[3], const Integer (&y)[3]) {
-  return {first_pixel(hn::Min(hn::Min(x[0], x[1]), x[2])), first_pixel(hn::Min(hn::Min(y[0], y[1]), y[2])),
-          end_pixel(hn::Max(hn::Max(x[0], x[1]), x[2])), end_pixel(hn::Max(hn::Max(y[0], y[1]), y[2]))};
-}
-
-HWY_INLINE LaneBox within(const LaneBox& box, std::int32_t width, std::int32_t height) {
-  const Integer zero = hn::Zero(kIntegers);
-  return {hn::Max(box.x0, zero), hn::Max(box.y0, zero), hn::Min(box.x1, integer(width)),
-          hn::Min(box.y1, integer(height))};
-}
-
-/// The tiles at the corners of boxes that hold a sample.
-struct LaneTiles {
-  Integer x0, y0, x1, y1;
-
-  HWY_INLINE LaneTiles(const LaneBox& box, int shift)
-      : x0(hn::ShiftRightSame(box.x0, shift)),
-        y0(hn::ShiftRightSame(box.y0, shift)),
-        x1(hn::ShiftRightSame(hn::Sub(box.x1, integer(1)), shift)),
-        y1(hn::ShiftRightSame(hn::Sub(box.y1, integer(1)), shift)) {}
-};
-
+template <class Arithmetic>
 void select(const ScreenBatch<float>& in, const TileSettings& settings, FrontEnd& front_end) {
   FrontEnd::Survivors& out = front_end.survivors;
   const TileGrid& grid = settings.grid;
@@ -186,12 +153,12 @@ void select(const ScreenBatch<float>& in, const TileSettings& settings, FrontEnd
     IntegerMask draws = hn::Gt(ids, integer(-1));
     if (hn::AllFalse(kIntegers, draws)) continue;
     Float px[3], py[3];
-    Integer x[3], y[3];
+    typename Arithmetic::Coordinate x[3], y[3];
     for (int i = 0; i < 3; ++i) {
       px[i] = hn::Load(kFloats, in.x[i] + first);
       py[i] = hn::Load(kFloats, in.y[i] + first);
-      x[i] = snapped(px[i]);
-      y[i] = snapped(py[i]);
+      x[i] = Arithmetic::coordinate(px[i]);
+      y[i] = Arithmetic::coordinate(py[i]);
     }
     const LaneBox box = within(whole_box(x, y), grid.width, grid.height);
     draws = hn::And(draws, box.holds_a_sample());
@@ -217,43 +184,43 @@ void select(const ScreenBatch<float>& in, const TileSettings& settings, FrontEnd
   for (const std::int32_t sum : sums) out.tiles += sum;
 }
 
-/// Side in pixels of the boxes of small triangles.
-constexpr int kSmallSide = 4;
-
 /// The samples of a vector of tiny triangles: boxes of at most 2 x 2 pixels, each within one tile.
 struct TinySamples {
   static constexpr int kSide = 2, kPlaces = kSide * kSide;
   IntegerMask covered[kPlaces];
   Float depths[kPlaces];
   Integer places[kPlaces];  ///< in the tile
+  IntegerMask certain;      ///< lanes that need no exact arithmetic; unless Arithmetic::kIsExact
 };
 
-HWY_INLINE TinySamples sample_tiny(const LaneCorner (&unsorted)[3], const LaneBox& box, const TileGrid& grid,
+template <class Arithmetic>
+HWY_INLINE TinySamples sample_tiny(const LaneCornerOf<typename Arithmetic::Coordinate> (&unsorted)[3],
+                                   const LaneBox& box, IntegerMask tiny, const TileGrid& grid,
                                    FillRule fill) {
-  LaneCorner corners[3] = {unsorted[0], unsorted[1], unsorted[2]};
+  LaneCornerOf<typename Arithmetic::Coordinate> corners[3] = {unsorted[0], unsorted[1], unsorted[2]};
   sort_corners(corners);
-  SmallEdges edges = small_edges(corners, box.x0, box.y0, fill);
-  const LanePlane plane = depth_plane(corners);
+  typename Arithmetic::Small triangles(corners, box, tiny, fill);
+  const LanePlane& plane = triangles.plane;
   const Integer in_tile = integer(grid.side() - 1);
   const Integer place =
       hn::Add(hn::Mul(hn::And(box.y0, in_tile), integer(grid.pitch())), hn::And(box.x0, in_tile));
   TinySamples samples;
+  samples.certain = triangles.draws;
   for (int row = 0; row < TinySamples::kSide; ++row) {
     const Integer y = hn::Add(box.y0, integer(row));
     const Float of_row = depth_of_row(plane, sample_of(y));
-    const IntegerMask in_row = hn::And(edges.draws, hn::Lt(y, box.y1));
+    const IntegerMask in_row = hn::And(triangles.draws, hn::Lt(y, box.y1));
+    triangles.start_row();
     for (int column = 0; column < TinySamples::kSide; ++column) {
       const int i = row * TinySamples::kSide + column;
-      Integer e[3];
-      for (int k = 0; k < 3; ++k)
-        e[k] = column == 0 ? edges.value[k] : hn::Add(edges.value[k], edges.per_column[k]);
+      const LaneCoverage coverage = triangles.coverage(column);
       const Integer x = hn::Add(box.x0, integer(column));
-      samples.covered[i] =
-          hn::And(hn::And(in_row, hn::Lt(x, box.x1)), hn::Gt(hn::Or(hn::Or(e[0], e[1]), e[2]), integer(-1)));
+      samples.covered[i] = hn::And(hn::And(in_row, hn::Lt(x, box.x1)), coverage.certain);
+      if constexpr (!Arithmetic::kIsExact)
+        samples.certain = hn::AndNot(hn::AndNot(coverage.certain, coverage.possible), samples.certain);
       samples.depths[i] = depth_at(plane, of_row, sample_of(x));
       samples.places[i] = hn::Add(place, integer(row * grid.pitch() + column));
     }
-    for (int k = 0; k < 3; ++k) edges.value[k] = hn::Add(edges.value[k], edges.per_row[k]);
   }
   return samples;
 }
@@ -279,20 +246,22 @@ HWY_INLINE void append(Float v, IntegerMask mask, std::uint32_t* to) {
   append(hn::BitCast(kIntegers, v), mask, to);
 }
 
+template <class Arithmetic>
 void distribute(const TileSettings& settings, FrontEnd& front_end) {
+  using Coordinate = typename Arithmetic::Coordinate;
   const FrontEnd::Survivors& from = front_end.survivors;
   const TileGrid& grid = settings.grid;
   for (std::int64_t first = 0; first < from.size; first += kWidth) {
     const auto at = static_cast<std::size_t>(first);
     const IntegerMask valid = hn::FirstN(kIntegers, static_cast<std::size_t>(from.size - first));
     Float px[3], py[3];
-    LaneCorner corners[3];
-    Integer x[3], y[3];
+    LaneCornerOf<Coordinate> corners[3];
+    Coordinate x[3], y[3];
     for (int i = 0; i < 3; ++i) {
       px[i] = hn::LoadU(kFloats, from.x[i] + at);
       py[i] = hn::LoadU(kFloats, from.y[i] + at);
-      x[i] = snapped(px[i]);
-      y[i] = snapped(py[i]);
+      x[i] = Arithmetic::coordinate(px[i]);
+      y[i] = Arithmetic::coordinate(py[i]);
       corners[i] = {x[i], y[i], hn::LoadU(kFloats, from.d[i] + at)};
     }
     const Integer ranks = hn::LoadU(kIntegers, from.ranks + at);
@@ -308,7 +277,8 @@ void distribute(const TileSettings& settings, FrontEnd& front_end) {
     IntegerMask tiny = hn::FirstN(kIntegers, 0);
     if (settings.techniques.fragments) tiny = hn::And(in_one, at_most(TinySamples::kSide));
     if (!hn::AllFalse(kIntegers, tiny)) {
-      const TinySamples samples = sample_tiny(corners, box, grid, settings.fill);
+      const TinySamples samples = sample_tiny<Arithmetic>(corners, box, tiny, grid, settings.fill);
+      if constexpr (!Arithmetic::kIsExact) tiny = hn::And(tiny, samples.certain);
       IntegerMask any = hn::And(tiny, samples.covered[0]);
       for (int i = 1; i < TinySamples::kPlaces; ++i) any = hn::Or(any, hn::And(tiny, samples.covered[i]));
       for_each_tile(any, tiles, [&](std::int32_t tile, IntegerMask here, std::uint32_t) HWY_ATTR {
@@ -368,29 +338,33 @@ HWY_INLINE void fetch(const Block* block) {
 
 /// Draws the small triangles of a block, each in a lane: one place of all boxes at a time. A sample beyond a
 /// box is outside of an edge or beyond the image, where the tile keeps nothing.
+template <class Arithmetic>
 void draw_small(const TriangleStreams::Block& block, const TileSettings& settings, TilePixels& tile) {
   fetch(block.next);
+  const SampleGrid samples{settings.fill, settings.grid.width, settings.grid.height};
   for (std::int64_t first = 0; first < block.size; first += kWidth) {
     const IntegerMask valid = hn::FirstN(kIntegers, static_cast<std::size_t>(block.size - first));
     const auto field = [&](int f) HWY_ATTR { return hn::Load(kCodes, block.fields[f] + first); };
-    LaneCorner corners[3];
-    Integer x[3], y[3];
+    LaneCornerOf<typename Arithmetic::Coordinate> corners[3];
+    typename Arithmetic::Coordinate x[3], y[3];
     for (int i = 0; i < 3; ++i) {
-      x[i] = snapped(hn::BitCast(kFloats, field(i)));
-      y[i] = snapped(hn::BitCast(kFloats, field(3 + i)));
+      x[i] = Arithmetic::coordinate(hn::BitCast(kFloats, field(i)));
+      y[i] = Arithmetic::coordinate(hn::BitCast(kFloats, field(3 + i)));
       corners[i] = {x[i], y[i], hn::BitCast(kFloats, field(6 + i))};
     }
     const LaneBox whole = whole_box(x, y);
     const LaneBox box = {hn::Max(whole.x0, integer(tile.box.x0)), hn::Max(whole.y0, integer(tile.box.y0)),
                          whole.x1, whole.y1};
     sort_corners(corners);
-    SmallEdges edges = small_edges(corners, box.x0, box.y0, settings.fill);
-    const LanePlane plane = depth_plane(corners);
-    const IntegerMask draws = hn::And(valid, edges.draws);
-    edges.value[0] =
-        hn::IfThenElse(draws, edges.value[0], integer(std::numeric_limits<std::int32_t>::min() / 2));
+    typename Arithmetic::Small triangles(corners, box, valid, settings.fill);
+    const LanePlane& plane = triangles.plane;
+    if constexpr (!Arithmetic::kIsExact)
+      for (std::uint32_t alone = bits_of(hn::AndNot(triangles.draws, valid)); alone != 0; alone &= alone - 1)
+        draw_one_by_one<typename Arithmetic::Mode>(
+            block, static_cast<std::size_t>(first) + static_cast<std::size_t>(std::countr_zero(alone)),
+            samples, tile);
     const auto most = [&](Integer v) HWY_ATTR {
-      return hn::GetLane(hn::MaxOfLanes(kIntegers, hn::IfThenElseZero(draws, v)));
+      return hn::GetLane(hn::MaxOfLanes(kIntegers, hn::IfThenElseZero(triangles.draws, v)));
     };
     const int columns = std::min(kSmallSide, most(hn::Sub(box.x1, box.x0)));
     const int rows = std::min(kSmallSide, most(hn::Sub(box.y1, box.y0)));
@@ -401,6 +375,11 @@ void draw_small(const TriangleStreams::Block& block, const TileSettings& setting
           plane.gx, hn::Sub(hn::Add(sample_x, hn::Set(kFloats, static_cast<float>(column))), plane.x0));
     alignas(64) std::int32_t places[kLanes];
     alignas(64) std::int32_t ranks[kLanes];
+    [[maybe_unused]] alignas(64) std::int32_t box_x[kLanes], box_y[kLanes];
+    if constexpr (!Arithmetic::kIsExact) {
+      hn::Store(box.x0, kIntegers, box_x);
+      hn::Store(box.y0, kIntegers, box_y);
+    }
     hn::Store(hn::Add(hn::Mul(hn::Sub(box.y0, integer(tile.box.y0)),
                               integer(static_cast<std::int32_t>(tile.pitch))),
                       hn::Sub(box.x0, integer(tile.box.x0))),
@@ -408,14 +387,18 @@ void draw_small(const TriangleStreams::Block& block, const TileSettings& setting
     hn::Store(hn::BitCast(kIntegers, field(9)), kIntegers, ranks);
     for (int row = 0; row < rows; ++row) {
       const Float of_row = depth_of_row(plane, hn::Add(sample_y, hn::Set(kFloats, static_cast<float>(row))));
-      Integer e0 = edges.value[0], e1 = edges.value[1], e2 = edges.value[2];
+      triangles.start_row();
       for (int column = 0; column < columns; ++column) {
-        const IntegerMask inside = hn::Gt(hn::Or(hn::Or(e0, e1), e2), integer(-1));
-        e0 = hn::Add(e0, edges.per_column[0]);
-        e1 = hn::Add(e1, edges.per_column[1]);
-        e2 = hn::Add(e2, edges.per_column[2]);
-        std::uint32_t bits = bits_of(inside);
+        const LaneCoverage coverage = triangles.coverage(column);
+        std::uint32_t bits = bits_of(coverage.possible);
         if (bits == 0) continue;
+        if constexpr (!Arithmetic::kIsExact)
+          for (std::uint32_t left = bits ^ bits_of(coverage.certain); left != 0; left &= left - 1) {
+            const auto lane = static_cast<std::size_t>(std::countr_zero(left));
+            if (!covers_exactly<typename Arithmetic::Mode>(block, static_cast<std::size_t>(first) + lane,
+                                                           samples, box_x[lane] + column, box_y[lane] + row))
+              bits &= ~(1u << lane);
+          }
         alignas(64) float depths[kLanes];
         hn::Store(clamped(hn::Add(of_row, of_column[column]), plane.low, plane.high), kFloats, depths);
         const std::int64_t step = row * tile.pitch + column;
@@ -424,199 +407,52 @@ void draw_small(const TriangleStreams::Block& block, const TileSettings& setting
           tile.keep(places[lane] + step, depths[lane], ranks[lane]);
         }
       }
-      for (int k = 0; k < 3; ++k) edges.value[k] = hn::Add(edges.value[k], edges.per_row[k]);
     }
   }
 }
 
-/// Integers in double, in which products of coordinates are exact: a vector's, in as many vectors as they
-/// take.
-struct Wide {
-  static constexpr std::size_t kParts = kLanes / hn::MaxLanes(kDoubles);
-  Double parts[kParts];
-};
-HWY_INLINE Wide wide(Integer v) {
-#if HWY_TARGET == HWY_SCALAR  // a vector of one lane has no halves
-  return {{hn::PromoteTo(kDoubles, v)}};
-#else
-  return {
-      {hn::PromoteTo(kDoubles, hn::LowerHalf(v)), hn::PromoteTo(kDoubles, hn::UpperHalf(kHalfIntegers, v))}};
-#endif
-}
-template <class Function>
-HWY_INLINE Integer narrow(const Wide& v, Function function) {
-#if HWY_TARGET == HWY_SCALAR
-  return hn::DemoteTo(kHalfIntegers, function(v.parts[0]));
-#else
-  return hn::Combine(kIntegers, hn::DemoteTo(kHalfIntegers, function(v.parts[1])),
-                     hn::DemoteTo(kHalfIntegers, function(v.parts[0])));
-#endif
-}
-HWY_INLINE Wide operator*(const Wide& a, const Wide& b) {
-  Wide product;
-  for (std::size_t i = 0; i < Wide::kParts; ++i) product.parts[i] = hn::Mul(a.parts[i], b.parts[i]);
-  return product;
-}
-HWY_INLINE Wide operator-(const Wide& a, const Wide& b) {
-  Wide difference;
-  for (std::size_t i = 0; i < Wide::kParts; ++i) difference.parts[i] = hn::Sub(a.parts[i], b.parts[i]);
-  return difference;
-}
-
-/// Cut to [-limit, limit].
-HWY_INLINE Double cut(Double v, double limit) {
-  const Double most = hn::Set(kDoubles, limit);
-  return hn::Max(hn::Min(v, most), hn::Neg(most));
-}
-
-/// Set-up of a vector of triangles for a tile.
-class TileSetup {
- public:
-  /// Corners in 1/256 px from the tile's first sample.
-  HWY_INLINE TileSetup(IntegerMask lanes, const LaneCorner (&corners)[3], FillRule fill) {
-    const auto magnitude = [](Integer a, Integer b) HWY_ATTR { return hn::Max(hn::Abs(a), hn::Abs(b)); };
-    const LaneCorner &a = corners[0], &b = corners[1], &c = corners[2];
-    const Integer extent_x = hn::Sub(hn::Max(hn::Max(a.x, b.x), c.x), hn::Min(hn::Min(a.x, b.x), c.x));
-    const Integer extent_y = hn::Sub(hn::Max(hn::Max(a.y, b.y), c.y), hn::Min(hn::Min(a.y, b.y), c.y));
-    const Integer farthest = hn::Max(hn::Max(magnitude(a.x, a.y), magnitude(b.x, b.y)), magnitude(c.x, c.y));
-    const Integer extent = hn::Max(extent_x, extent_y);
-    // Differences below 2^14 times coordinates below 2^15: two such products and their difference fit.
-    const IntegerMask is_near = hn::And(hn::Lt(extent, integer(1 << 14)), hn::Lt(farthest, integer(1 << 15)));
-    in_reach = hn::Lt(extent, integer(kReach));
-    if (hn::AllFalse(kIntegers, hn::AndNot(is_near, lanes)))
-      edges_near(corners, fill);
-    else
-      edges_far(corners, fill);
-  }
-
-  Integer value[3], per_column[3], per_row[3];
-  IntegerMask has_area;
-  /// Whether edges do not overflow in 32 bits within a tile.
-  IntegerMask in_reach;
-
- private:
-  /// |dx| + |dy| < 2^23, times a tile of 128 pixels, is below 2^30.
-  static constexpr std::int32_t kReach = 1 << 22;
-
-  /// The part of an edge that both ways share; `flip` as is_flipped().
-  HWY_INLINE void direct(int e, const LaneCorner (&c)[3], IntegerMask negative) {
-    const LaneCorner &from = c[kEdgeFrom[e]], &to = c[kEdgeTo[e]];
-    const IntegerMask flip = e == 2 ? hn::Not(negative) : negative;
-    const Integer ex = hn::Sub(to.x, from.x), ey = hn::Sub(to.y, from.y);
-    per_row[e] = hn::IfThenElse(flip, hn::Neg(ex), ex);
-    per_column[e] = hn::IfThenElse(flip, ey, hn::Neg(ey));
-  }
-
-  /// 0 where samples on the edge belong to the triangle, else 1.
-  HWY_INLINE Integer least(int e, FillRule fill) const {
-    const Integer zero = hn::Zero(kIntegers);
-    if (fill == FillRule::kClosed) return zero;
-    const IntegerMask owned =
-        hn::Or(hn::Gt(per_column[e], zero), hn::And(hn::Eq(per_column[e], zero), hn::Gt(per_row[e], zero)));
-    return hn::IfThenZeroElse(owned, integer(1));
-  }
-
-  HWY_INLINE void edges_near(const LaneCorner (&c)[3], FillRule fill) {
-    const Integer area = hn::Sub(hn::Mul(hn::Sub(c[1].x, c[0].x), hn::Sub(c[2].y, c[0].y)),
-                                 hn::Mul(hn::Sub(c[1].y, c[0].y), hn::Sub(c[2].x, c[0].x)));
-    has_area = hn::Ne(area, hn::Zero(kIntegers));
-    for (int e = 0; e < 3; ++e) {
-      direct(e, c, hn::Lt(area, hn::Zero(kIntegers)));
-      const LaneCorner& from = c[kEdgeFrom[e]];
-      // dx (0 - ay) - dy (0 - ax)
-      const Integer at_origin = hn::Neg(hn::Add(hn::Mul(per_row[e], from.y), hn::Mul(per_column[e], from.x)));
-      value[e] = hn::ShiftRight<8>(hn::Sub(at_origin, least(e, fill)));
-    }
-  }
-
-  HWY_INLINE void edges_far(const LaneCorner (&c)[3], FillRule fill) {
-    const Wide area = wide(hn::Sub(c[1].x, c[0].x)) * wide(hn::Sub(c[2].y, c[0].y)) -
-                      wide(hn::Sub(c[1].y, c[0].y)) * wide(hn::Sub(c[2].x, c[0].x));
-    const Integer sign = narrow(area, [](Double v) HWY_ATTR { return cut(v, 1); });
-    has_area = hn::Ne(sign, hn::Zero(kIntegers));
-    for (int e = 0; e < 3; ++e) {
-      direct(e, c, hn::Lt(sign, hn::Zero(kIntegers)));
-      const LaneCorner& from = c[kEdgeFrom[e]];
-      const Wide at_origin = wide(hn::Neg(per_row[e])) * wide(from.y) - wide(per_column[e]) * wide(from.x) -
-                             wide(least(e, fill));
-      value[e] = narrow(at_origin, [](Double v) HWY_ATTR {
-        return cut(hn::Floor(hn::Mul(v, hn::Set(kDoubles, 0x1p-8))), 0x1p30);
-      });
-    }
-  }
-};
-
-HWY_INLINE void store(Integer v, IntegerMask mask, std::int32_t* to) {
-  hn::StoreU(hn::Compress(v, mask), kIntegers, to);
-}
-HWY_INLINE void store(Float v, IntegerMask mask, float* to) {
-  hn::StoreU(hn::Compress(v, hn::RebindMask(kFloats, mask)), kFloats, to);
-}
-
-/// Sets up what of a block reaches the tile; triangles too large for 32 bits are drawn at once.
+/// Sets up what of a block reaches the tile; triangles that the lanes cannot hold are drawn at once.
+template <class Arithmetic>
 void set_up(const TriangleStreams::Block& block, const TileSettings& settings, TilePixels& tile,
             TileTriangles& out) {
   fetch(block.next);
-  const Integer left = integer(tile.box.x0 * 256 + 128), top = integer(tile.box.y0 * 256 + 128);
-  const Integer one = integer(1), zero = hn::Zero(kIntegers);
   for (std::int64_t first = 0; first < block.size; first += kWidth) {
-    IntegerMask draws = hn::FirstN(kIntegers, static_cast<std::size_t>(block.size - first));
+    const IntegerMask valid = hn::FirstN(kIntegers, static_cast<std::size_t>(block.size - first));
     const auto field = [&](int f) HWY_ATTR { return hn::LoadU(kCodes, block.fields[f] + first); };
-    LaneCorner corners[3];
+    LaneCornerOf<typename Arithmetic::Coordinate> corners[3];
     for (int i = 0; i < 3; ++i)
-      corners[i] = {snapped(hn::BitCast(kFloats, field(i))), snapped(hn::BitCast(kFloats, field(3 + i))),
+      corners[i] = {Arithmetic::coordinate(hn::BitCast(kFloats, field(i))),
+                    Arithmetic::coordinate(hn::BitCast(kFloats, field(3 + i))),
                     hn::BitCast(kFloats, field(6 + i))};
     sort_corners(corners);
-    const LanePlane plane = depth_plane(corners);
-    for (LaneCorner& corner : corners) {
-      corner.x = hn::Sub(corner.x, left);
-      corner.y = hn::Sub(corner.y, top);
-    }
-    const TileSetup setup(draws, corners, settings.fill);
-    const auto least = [](Integer a, Integer b, Integer c) HWY_ATTR { return hn::Min(hn::Min(a, b), c); };
-    const auto most = [](Integer a, Integer b, Integer c) HWY_ATTR { return hn::Max(hn::Max(a, b), c); };
-    const auto first_at = [](Integer v) HWY_ATTR { return hn::ShiftRight<8>(hn::Add(v, integer(255))); };
-    const auto end_at = [](Integer v) HWY_ATTR { return hn::Add(hn::ShiftRight<8>(v), integer(1)); };
-    const LaneBox box = within({first_at(least(corners[0].x, corners[1].x, corners[2].x)),
-                                first_at(least(corners[0].y, corners[1].y, corners[2].y)),
-                                end_at(most(corners[0].x, corners[1].x, corners[2].x)),
-                                end_at(most(corners[0].y, corners[1].y, corners[2].y))},
-                               tile.width(), tile.height());
-    draws = hn::And(hn::And(draws, setup.has_area), box.holds_a_sample());
-    for (std::uint32_t far = bits_of(hn::AndNot(setup.in_reach, draws)); far != 0; far &= far - 1)
-      draw_one_by_one<Fixed8>(
-          block, static_cast<std::size_t>(first) + static_cast<std::size_t>(std::countr_zero(far)),
+    const typename Arithmetic::Triangles triangles(valid, corners, tile.box, settings.fill);
+    const LanePlane& plane = triangles.plane;
+    const LaneBox& box = triangles.box;
+    for (std::uint32_t alone = bits_of(hn::AndNot(triangles.in_lanes, triangles.draws)); alone != 0;
+         alone &= alone - 1)
+      draw_one_by_one<typename Arithmetic::Mode>(
+          block, static_cast<std::size_t>(first) + static_cast<std::size_t>(std::countr_zero(alone)),
           {settings.fill, settings.grid.width, settings.grid.height}, tile);
-    draws = hn::And(draws, setup.in_reach);
-
-    const Integer last_x = hn::Sub(box.x1, one), last_y = hn::Sub(box.y1, one);
-    Integer partial = zero;
+    IntegerMask draws = hn::And(triangles.draws, triangles.in_lanes);
+    Integer partial = hn::Zero(kIntegers);
     for (int e = 0; e < 3; ++e) {
-      const Integer at_x0 = hn::Mul(setup.per_column[e], box.x0),
-                    at_x1 = hn::Mul(setup.per_column[e], last_x);
-      const Integer at_y0 = hn::Mul(setup.per_row[e], box.y0), at_y1 = hn::Mul(setup.per_row[e], last_y);
-      const Integer largest = hn::Add(setup.value[e], hn::Add(hn::Max(at_x0, at_x1), hn::Max(at_y0, at_y1)));
-      const Integer smallest = hn::Add(setup.value[e], hn::Add(hn::Min(at_x0, at_x1), hn::Min(at_y0, at_y1)));
-      draws = hn::AndNot(hn::Lt(largest, zero), draws);
-      partial = hn::Or(partial, hn::IfThenElseZero(hn::Lt(smallest, zero), integer(1 << e)));
+      const EdgeCut edge = triangles.cut_by(e);
+      draws = hn::AndNot(edge.misses, draws);
+      partial = hn::Or(partial, hn::IfThenElseZero(edge.cuts, integer(1 << e)));
     }
     if (hn::AllFalse(kIntegers, draws)) continue;
 
     // Each operation of the depth rounds monotonically: the smallest of a box is that of a corner.
     const auto nearer_end = [&](Float gradient, Integer low, Integer high) HWY_ATTR {
       const auto rises = hn::RebindMask(kIntegers, hn::Gt(gradient, hn::Zero(kFloats)));
-      return hn::IfThenElse(rises, low, hn::Sub(high, one));
+      return hn::IfThenElse(rises, low, hn::Sub(high, integer(1)));
     };
     const Integer near_x = hn::Add(nearer_end(plane.gx, box.x0, box.x1), integer(tile.box.x0));
     const Integer near_y = hn::Add(nearer_end(plane.gy, box.y0, box.y1), integer(tile.box.y0));
     const Float nearest = depth_at(plane, depth_of_row(plane, sample_of(near_y)), sample_of(near_x));
 
     const std::size_t end = out.size;
-    for (int e = 0; e < 3; ++e) {
-      store(setup.value[e], draws, out.value[e] + end);
-      store(setup.per_column[e], draws, out.per_column[e] + end);
-      store(setup.per_row[e], draws, out.per_row[e] + end);
-    }
+    triangles.store_edges(draws, out);
     store(partial, draws, out.partial + end);
     store(box.x0, draws, out.x0 + end);
     store(box.y0, draws, out.y0 + end);
@@ -648,8 +484,8 @@ HWY_INLINE void keep(IntegerMask inside, Float depth, Integer rank, float* depth
 }
 
 /// Draws triangle i, whose box is cut by the edges `cutting`; the others need no look.
-template <int kEdges>
-HWY_INLINE void draw_triangle(const TileTriangles& t, std::size_t i, const int (&cutting)[3],
+template <class Arithmetic, int kEdges>
+HWY_INLINE void draw_triangle(const TileTriangles& t, std::size_t i, const int (&cutting)[3], FillRule fill,
                               const TilePixels& tile) {
   const std::int32_t x1 = t.x1[i], y0 = t.y0[i], y1 = t.y1[i];
   const float d0 = t.d0[i], gy = t.gy[i], py = t.py[i];
@@ -658,47 +494,37 @@ HWY_INLINE void draw_triangle(const TileTriangles& t, std::size_t i, const int (
   const Integer rank = integer(t.ranks[i]);
   const float first_y = static_cast<float>(tile.box.y0 + y0) + 0.5f;
   const std::int64_t pitch = tile.pitch;
+  typename Arithmetic::template Cut<kEdges> edges(t, i, cutting, tile.box, fill);
   for (std::int32_t x = t.x0[i]; x < x1; x += kWidth) {
     const Integer columns = hn::Iota(kIntegers, x);
     const IntegerMask in_box = hn::Lt(columns, integer(x1));
-    Integer value[3], per_row[3];
-    for (int k = 0; k < kEdges; ++k) {
-      const int e = cutting[k];
-      per_row[k] = integer(t.per_row[e][i]);
-      value[k] = hn::Add(integer(t.value[e][i] + t.per_row[e][i] * y0),
-                         hn::Mul(integer(t.per_column[e][i]), columns));
-    }
+    edges.start(columns, y0);
     const Float of_columns = hn::Mul(gx, hn::Sub(sample_of(hn::Add(columns, integer(tile.box.x0))), px));
     float* depths = tile.depths + y0 * pitch + x;
     std::int32_t* ranks = tile.ranks + y0 * pitch + x;
     float sample_y = first_y;  // small multiples of one half: exact
     for (std::int32_t rows = y1 - y0; rows > 0; --rows, depths += pitch, ranks += pitch, sample_y += 1.0f) {
-      IntegerMask inside = in_box;
-      if constexpr (kEdges > 0) {
-        Integer signs = value[0];
-        for (int k = 1; k < kEdges; ++k) signs = hn::Or(signs, value[k]);
-        inside = hn::And(inside, hn::Gt(signs, integer(-1)));
-        for (int k = 0; k < kEdges; ++k) value[k] = hn::Add(value[k], per_row[k]);
-      }
+      const IntegerMask inside = edges.next_row(in_box);
       const float of_row = d0 + gy * (sample_y - py);
       keep(inside, clamped(hn::Add(hn::Set(kFloats, of_row), of_columns), low, high), rank, depths, ranks);
     }
   }
 }
 
-void draw_triangle(const TileTriangles& t, std::size_t i, const TilePixels& tile) {
+template <class Arithmetic>
+void draw_triangle(const TileTriangles& t, std::size_t i, FillRule fill, const TilePixels& tile) {
   int cutting[3] = {}, edges = 0;
   for (int e = 0; e < 3; ++e)
     if (t.partial[i] >> e & 1) cutting[edges++] = e;
   switch (edges) {
     case 0:
-      return draw_triangle<0>(t, i, cutting, tile);
+      return draw_triangle<Arithmetic, 0>(t, i, cutting, fill, tile);
     case 1:
-      return draw_triangle<1>(t, i, cutting, tile);
+      return draw_triangle<Arithmetic, 1>(t, i, cutting, fill, tile);
     case 2:
-      return draw_triangle<2>(t, i, cutting, tile);
+      return draw_triangle<Arithmetic, 2>(t, i, cutting, fill, tile);
     default:
-      return draw_triangle<3>(t, i, cutting, tile);
+      return draw_triangle<Arithmetic, 3>(t, i, cutting, fill, tile);
   }
 }
 
@@ -712,11 +538,13 @@ float farthest_depth(const TilePixels& tile) {
 }
 
 /// Draws the triangles that are set up and empties their list.
-void draw_triangles(TileScratch& scratch, bool front_to_back, TilePixels& tile) {
+template <class Arithmetic>
+void draw_triangles(TileScratch& scratch, const TileSettings& settings, TilePixels& tile) {
   TileTriangles& triangles = scratch.triangles;
   std::vector<std::uint64_t>& order = scratch.order;
-  if (!front_to_back) {
-    for (std::size_t i = 0; i < triangles.size; ++i) draw_triangle(triangles, i, tile);
+  if (!settings.techniques.front_to_back) {
+    for (std::size_t i = 0; i < triangles.size; ++i)
+      draw_triangle<Arithmetic>(triangles, i, settings.fill, tile);
     triangles.size = 0;
     return;
   }
@@ -740,7 +568,7 @@ void draw_triangles(TileScratch& scratch, bool front_to_back, TilePixels& tile) 
       ++scratch.hidden_entries;
       return;
     }
-    draw_triangle(triangles, i, tile);
+    draw_triangle<Arithmetic>(triangles, i, settings.fill, tile);
     drawn += box_area(i);
     if (drawn < area) return;
     farthest = farthest_depth(tile);
@@ -833,6 +661,7 @@ void resolve(const TilePixels& tile, const TileSettings& settings, TileScratch& 
   }
 }
 
+template <class Arithmetic>
 void draw(const TileTask& task, const TileSettings& settings, TileScratch& scratch,
           const TileOutput& output) {
   // A row's left neighbours are looked at too: the first row has room before it.
@@ -849,14 +678,14 @@ void draw(const TileTask& task, const TileSettings& settings, TileScratch& scrat
   TileTriangles& triangles = scratch.triangles;
   for (const FrontEnd* front_end : task.front_ends)
     for (auto block = front_end->triangles.blocks(task.tile); block != nullptr; block = block->next) {
-      set_up(*block, settings, tile, triangles);
+      set_up<Arithmetic>(*block, settings, tile, triangles);
       if (triangles.size >= TileTriangles::kSize)
-        draw_triangles(scratch, settings.techniques.front_to_back, tile);
+        draw_triangles<Arithmetic>(scratch, settings, tile);
     }
-  draw_triangles(scratch, settings.techniques.front_to_back, tile);
+  draw_triangles<Arithmetic>(scratch, settings, tile);
   for (const FrontEnd* front_end : task.front_ends)
     for (auto block = front_end->small_triangles.blocks(task.tile); block != nullptr; block = block->next)
-      draw_small(*block, settings, tile);
+      draw_small<Arithmetic>(*block, settings, tile);
   for (const FrontEnd* front_end : task.front_ends)
     for (auto block = front_end->fragments.blocks(task.tile); block != nullptr; block = block->next) {
       fetch(block->next);
@@ -872,6 +701,29 @@ void draw(const TileTask& task, const TileSettings& settings, TileScratch& scrat
   }
 }
 
+// The dispatch tables take no templates.
+void select_fixed_8(const ScreenBatch<float>& in, const TileSettings& settings, FrontEnd& front_end) {
+  select<FixedArithmetic>(in, settings, front_end);
+}
+void distribute_fixed_8(const TileSettings& settings, FrontEnd& front_end) {
+  distribute<FixedArithmetic>(settings, front_end);
+}
+void draw_fixed_8(const TileTask& task, const TileSettings& settings, TileScratch& scratch,
+                  const TileOutput& output) {
+  draw<FixedArithmetic>(task, settings, scratch, output);
+}
+
+void select_filtered(const ScreenBatch<float>& in, const TileSettings& settings, FrontEnd& front_end) {
+  select<FilteredArithmetic>(in, settings, front_end);
+}
+void distribute_filtered(const TileSettings& settings, FrontEnd& front_end) {
+  distribute<FilteredArithmetic>(settings, front_end);
+}
+void draw_filtered(const TileTask& task, const TileSettings& settings, TileScratch& scratch,
+                   const TileOutput& output) {
+  draw<FilteredArithmetic>(task, settings, scratch, output);
+}
+
 }  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace rasterbench
@@ -881,24 +733,33 @@ HWY_AFTER_NAMESPACE();
 namespace rasterbench {
 namespace {
 
-HWY_EXPORT(select);
-HWY_EXPORT(distribute);
-HWY_EXPORT(draw);
+#define RASTERBENCH_TILE_LANES(mode)                                                                \
+  HWY_EXPORT(select_##mode);                                                                        \
+  HWY_EXPORT(distribute_##mode);                                                                    \
+  HWY_EXPORT(draw_##mode);                                                                          \
+  TileLanes mode##_for(Isa isa) {                                                                   \
+    if (isa == Isa::kBaseline) /* vectors of one lane */                                            \
+      return {HWY_STATIC_DISPATCH(select_##mode), HWY_STATIC_DISPATCH(distribute_##mode),           \
+              HWY_STATIC_DISPATCH(draw_##mode)};                                                    \
+    const std::size_t index = dispatch_index(isa);                                                  \
+    return {HWY_DISPATCH_TABLE(select_##mode)[index], HWY_DISPATCH_TABLE(distribute_##mode)[index], \
+            HWY_DISPATCH_TABLE(draw_##mode)[index]};                                                \
+  }
 
-TileLanes compiled_for(Isa isa) {
-  if (isa == Isa::kBaseline)  // vectors of one lane
-    return {HWY_STATIC_DISPATCH(select), HWY_STATIC_DISPATCH(distribute), HWY_STATIC_DISPATCH(draw)};
-  const std::size_t index = dispatch_index(isa);
-  return {HWY_DISPATCH_TABLE(select)[index], HWY_DISPATCH_TABLE(distribute)[index],
-          HWY_DISPATCH_TABLE(draw)[index]};
-}
+RASTERBENCH_TILE_LANES(fixed_8)
+RASTERBENCH_TILE_LANES(filtered)
+#undef RASTERBENCH_TILE_LANES
 
 }  // namespace
 
-const TileLanes& tile_lanes(Isa isa) {
-  static const TileLanes compiled[] = {compiled_for(Isa::kBaseline), compiled_for(Isa::kSse4),
-                                       compiled_for(Isa::kAvx2), compiled_for(Isa::kAvx512)};
-  return compiled[static_cast<std::size_t>(isa)];
+const TileLanes& tile_lanes(Isa isa, std::string_view mode) {
+  static const TileLanes fixed[] = {fixed_8_for(Isa::kBaseline), fixed_8_for(Isa::kSse4),
+                                    fixed_8_for(Isa::kAvx2), fixed_8_for(Isa::kAvx512)};
+  static const TileLanes filtered[] = {filtered_for(Isa::kBaseline), filtered_for(Isa::kSse4),
+                                       filtered_for(Isa::kAvx2), filtered_for(Isa::kAvx512)};
+  if (mode != Fixed8::kInfo.name && mode != Filtered::kInfo.name)
+    throw std::logic_error("fused_tiles has no loops for this mode");
+  return (mode == Fixed8::kInfo.name ? fixed : filtered)[static_cast<std::size_t>(isa)];
 }
 
 }  // namespace rasterbench

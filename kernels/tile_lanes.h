@@ -1,9 +1,10 @@
 // The two halves of fused_tiles in vectors: from screen triangles to the streams of the tiles, and from the
-// streams of a tile to its pixels. Mode fixed_8, with the bits of its scalar specification.
+// streams of a tile to its pixels. Modes fixed_8 and filtered, with the bits of their scalar specifications.
 #pragma once
 
 #include <cstdint>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "base/isa.h"
@@ -97,9 +98,13 @@ struct TileTriangles {
   static constexpr std::size_t kSize = 256;
   static constexpr std::size_t kRoom = kSize + TriangleStreams::kCapacity + TriangleStreams::kOverhang;
 
-  /// Edge e at pixel (x, y): value + per_column x + per_row y >= 0 inside.
+  /// In mode fixed_8: edge e at pixel (x, y): value + per_column x + per_row y >= 0 inside.
   alignas(64) std::int32_t value[3][kRoom], per_column[3][kRoom], per_row[3][kRoom];
-  alignas(64) std::int32_t partial[kRoom];  ///< bit e: edge e has samples of the box on both sides
+  /// In mode filtered instead: sorted corners in pixels, the bound of FilteredSetup, 1 where the orientation
+  /// is negative.
+  alignas(64) float x[3][kRoom], y[3][kRoom], error[kRoom];
+  alignas(64) std::int32_t is_negative[kRoom];
+  alignas(64) std::int32_t partial[kRoom];  ///< bit e: edge e may leave samples of the box outside
   alignas(64) std::int32_t x0[kRoom], y0[kRoom], x1[kRoom], y1[kRoom];  ///< the box within the tile
   alignas(64) float d0[kRoom], gx[kRoom], gy[kRoom], low[kRoom], high[kRoom], px[kRoom], py[kRoom];
   alignas(64) float nearest[kRoom];  ///< smallest depth of a sample of the box
@@ -157,7 +162,7 @@ struct TileLanes {
                const TileOutput& output);
 };
 
-/// The loops for an instruction set that this CPU has.
-const TileLanes& tile_lanes(Isa isa);
+/// The loops for an instruction set that this CPU has, in mode fixed_8 or filtered.
+const TileLanes& tile_lanes(Isa isa, std::string_view mode);
 
 }  // namespace rasterbench

@@ -1,0 +1,278 @@
+// The arithmetic of mode filtered in the loops of fused_tiles: float32 with an error bound, double where an
+// orientation or a gradient needs it, and the scalar specification where the sign is uncertain. Signs are
+// exact either way, so that the bound may be wider than that of FilteredEdges. To be included as
+// fixed_lanes-inl.h is.
+#if defined(RASTERBENCH_KERNELS_TILE_FILTERED_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef RASTERBENCH_KERNELS_TILE_FILTERED_INL_H_
+#undef RASTERBENCH_KERNELS_TILE_FILTERED_INL_H_
+#else
+#define RASTERBENCH_KERNELS_TILE_FILTERED_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <bit>
+#include <cstdint>
+#include <limits>
+
+#include "kernels/fixed_lanes-inl.h"
+#include "kernels/tile_lanes.h"
+#include "kernels/tile_vectors-inl.h"
+#include "numeric/modes.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace rasterbench {
+namespace HWY_NAMESPACE {
+namespace {
+
+using FloatCorner = LaneCornerOf<Float>;  // in pixels
+
+/// Set-up of a vector of triangles, of sorted corners: FilteredEdges and SteadyF32Depth.
+struct FilteredSetup {
+  HWY_INLINE explicit FilteredSetup(const FloatCorner (&c)[3]) {
+    const Wide x1 = wide(c[1].x) - wide(c[0].x), y1 = wide(c[1].y) - wide(c[0].y);
+    const Wide x2 = wide(c[2].x) - wide(c[0].x), y2 = wide(c[2].y) - wide(c[0].y);
+    const Wide forth = x1 * y2, back = y1 * x2, area = forth - back;
+    Wide certain_area;
+    for (std::size_t i = 0; i < Wide::kParts; ++i) {  // the filter of FilteredEdges
+      const Double size = hn::Add(hn::Abs(forth.parts[i]), hn::Abs(back.parts[i]));
+      const auto exceeds = hn::Gt(hn::Abs(area.parts[i]), hn::Mul(hn::Set(kDoubles, 5 * 0x1p-53), size));
+      certain_area.parts[i] = hn::IfThenElseZero(exceeds, area.parts[i]);
+    }
+    const Float orientation = narrow(certain_area), zero = hn::Zero(kFloats);
+    is_certain = hn::RebindMask(kIntegers, hn::Ne(orientation, zero));
+    const FloatMask negative = hn::Lt(orientation, zero);
+
+    const Wide d1 = wide(c[1].d) - wide(c[0].d), d2 = wide(c[2].d) - wide(c[0].d);
+    plane.d0 = c[0].d;
+    plane.gx = narrow((d1 * y2 - d2 * y1) / area);
+    plane.gy = narrow((d2 * x1 - d1 * x2) / area);
+    plane.low = hn::Min(hn::Min(c[0].d, c[1].d), c[2].d);
+    plane.high = hn::Max(hn::Max(c[0].d, c[1].d), c[2].d);
+    plane.x0 = c[0].x;
+    plane.y0 = c[0].y;
+
+    const Float width = hn::Sub(c[2].x, c[0].x);
+    const Float height =
+        hn::Sub(hn::Max(hn::Max(c[0].y, c[1].y), c[2].y), hn::Min(hn::Min(c[0].y, c[1].y), c[2].y));
+    Float size = zero;
+    for (int e = 0; e < 3; ++e) {
+      const FloatCorner &from = c[kEdgeFrom[e]], &to = c[kEdgeTo[e]];
+      const Float ex = hn::Sub(to.x, from.x), ey = hn::Sub(to.y, from.y);
+      const FloatMask flip = e == 2 ? hn::Not(negative) : negative;
+      dx[e] = hn::IfThenElse(flip, hn::Neg(ex), ex);
+      dy[e] = hn::IfThenElse(flip, hn::Neg(ey), ey);
+      size = hn::Max(size, hn::Add(hn::Mul(hn::Abs(ex), height), hn::Mul(hn::Abs(ey), width)));
+    }
+    // The 5 of FilteredEdges, and ample for the roundings of these lines in float32.
+    error = hn::Add(hn::Mul(size, hn::Set(kFloats, 6 * 0x1p-24f)), hn::Set(kFloats, 0x1p-120f));
+    is_negative = negative;
+  }
+
+  LanePlane plane;
+  IntegerMask is_certain;  ///< the orientation; other lanes hold nothing of use
+  FloatMask is_negative;   ///< the orientation
+  Float dx[3], dy[3];      ///< the inside turned positive
+  Float error;             ///< of every edge function, in px^2, at samples of the triangle's own box
+};
+
+/// As FixedSmall.
+class FilteredSmall {
+ public:
+  /// Of sorted corners.
+  HWY_INLINE FilteredSmall(const FloatCorner (&corners)[3], const LaneBox& box, IntegerMask lanes, FillRule) {
+    const FilteredSetup setup(corners);
+    plane = setup.plane;
+    in_lanes = setup.is_certain;
+    draws = hn::And(lanes, in_lanes);
+    error_ = setup.error;
+    // Beyond its box a triangle has no bound, and covers nothing: an infinite part of an edge function says
+    // so.
+    const Float never = hn::Set(kFloats, std::numeric_limits<float>::infinity());
+    for (int e = 0; e < 3; ++e) {
+      dx_[e] = setup.dx[e];
+      ay_[e] = corners[kEdgeFrom[e]].y;
+      for (int column = 0; column < kSmallSide; ++column) {
+        const Float x = sample_of(hn::Add(box.x0, integer(column)));
+        of_columns_[e][column] = hn::Mul(setup.dy[e], hn::Sub(x, corners[kEdgeFrom[e]].x));
+      }
+    }
+    for (int column = 0; column < kSmallSide; ++column) {
+      const IntegerMask in_box = hn::And(draws, hn::Lt(hn::Add(box.x0, integer(column)), box.x1));
+      of_columns_[0][column] = hn::IfThenElse(hn::RebindMask(kFloats, in_box), of_columns_[0][column], never);
+    }
+    rows_left_ = hn::Sub(box.y1, box.y0);
+    sample_y_ = sample_of(box.y0);
+  }
+
+  HWY_INLINE void start_row() {
+    for (int e = 0; e < 3; ++e) of_row_[e] = hn::Mul(dx_[e], hn::Sub(sample_y_, ay_[e]));
+    of_row_[0] = hn::IfThenElse(hn::RebindMask(kFloats, hn::Gt(rows_left_, hn::Zero(kIntegers))), of_row_[0],
+                                hn::Set(kFloats, -std::numeric_limits<float>::infinity()));
+    rows_left_ = hn::Sub(rows_left_, integer(1));
+    sample_y_ = hn::Add(sample_y_, hn::Set(kFloats, 1.0f));  // exact: small multiples of one half
+  }
+  HWY_INLINE LaneCoverage coverage(int column) const {
+    const auto value = [&](int e) HWY_ATTR { return hn::Sub(of_row_[e], of_columns_[e][column]); };
+    const Float smallest = hn::Min(hn::Min(value(0), value(1)), value(2));
+    return {hn::RebindMask(kIntegers, hn::Ge(smallest, hn::Neg(error_))),
+            hn::RebindMask(kIntegers, hn::Gt(smallest, error_))};
+  }
+
+  LanePlane plane;
+  IntegerMask draws;
+  IntegerMask in_lanes;  ///< the others need the scalar specification
+
+ private:
+  Float dx_[3], ay_[3], error_, sample_y_;
+  Integer rows_left_;
+  Float of_columns_[3][kSmallSide], of_row_[3];
+};
+
+/// As FixedTileTriangles.
+class FilteredTileTriangles {
+ public:
+  HWY_INLINE FilteredTileTriangles(IntegerMask lanes, const FloatCorner (&corners)[3], const PixelBox& tile,
+                                   FillRule)
+      : corners_(corners), setup_(corners) {
+    const LaneBox whole = whole_box<Float>({corners[0].x, corners[1].x, corners[2].x},
+                                           {corners[0].y, corners[1].y, corners[2].y});
+    const Integer left = integer(tile.x0), top = integer(tile.y0), one = integer(1);
+    box = within(
+        {hn::Sub(whole.x0, left), hn::Sub(whole.y0, top), hn::Sub(whole.x1, left), hn::Sub(whole.y1, top)},
+        tile.x1 - tile.x0, tile.y1 - tile.y0);
+    plane = setup_.plane;
+    draws = hn::And(lanes, box.holds_a_sample());
+    in_lanes = setup_.is_certain;
+    x0_ = sample_of(hn::Add(box.x0, left));
+    y0_ = sample_of(hn::Add(box.y0, top));
+    x1_ = sample_of(hn::Add(hn::Sub(box.x1, one), left));
+    y1_ = sample_of(hn::Add(hn::Sub(box.y1, one), top));
+  }
+
+  /// Each operation of an edge function rounds monotonically: its smallest and largest values over the box
+  /// are those at two corners, where the bound holds. What is certain there is certain at every sample.
+  HWY_INLINE EdgeCut cut_by(int e) const {
+    const FloatCorner& from = corners_[kEdgeFrom[e]];
+    const Float of_y0 = hn::Mul(setup_.dx[e], hn::Sub(y0_, from.y)),
+                of_y1 = hn::Mul(setup_.dx[e], hn::Sub(y1_, from.y));
+    const Float of_x0 = hn::Mul(setup_.dy[e], hn::Sub(x0_, from.x)),
+                of_x1 = hn::Mul(setup_.dy[e], hn::Sub(x1_, from.x));
+    const Float largest = hn::Sub(hn::Max(of_y0, of_y1), hn::Min(of_x0, of_x1));
+    const Float smallest = hn::Sub(hn::Min(of_y0, of_y1), hn::Max(of_x0, of_x1));
+    return {hn::RebindMask(kIntegers, hn::Lt(largest, hn::Neg(setup_.error))),
+            hn::RebindMask(kIntegers, hn::Le(smallest, setup_.error))};
+  }
+
+  HWY_INLINE void store_edges(IntegerMask lanes, TileTriangles& out) const {
+    for (int i = 0; i < 3; ++i) {
+      store(corners_[i].x, lanes, out.x[i] + out.size);
+      store(corners_[i].y, lanes, out.y[i] + out.size);
+    }
+    store(setup_.error, lanes, out.error + out.size);
+    store(hn::IfThenElseZero(hn::RebindMask(kIntegers, setup_.is_negative), integer(1)), lanes,
+          out.is_negative + out.size);
+  }
+
+  LanePlane plane;
+  LaneBox box;
+  IntegerMask draws;
+  IntegerMask in_lanes;
+
+ private:
+  const FloatCorner (&corners_)[3];
+  FilteredSetup setup_;
+  Float x0_, y0_, x1_, y1_;  // the samples at the corners of the box
+};
+
+/// Which of the samples from pixel (x, y) on that `lanes` asks for, as bits, are inside of triangle i. By the
+/// scalar specification; out of line: it is rare.
+HWY_NOINLINE std::uint32_t exactly_inside(const TileTriangles& t, std::size_t i, FillRule fill,
+                                          std::int32_t x, std::int32_t y, std::uint32_t lanes) {
+  ScreenTriangle<float> triangle{};
+  for (int corner = 0; corner < 3; ++corner) {
+    triangle.x[corner] = t.x[corner][i];
+    triangle.y[corner] = t.y[corner][i];
+  }
+  FilteredEdges::Setup edges;
+  FilteredEdges::setup(triangle, fill, edges);
+  std::uint32_t inside = 0;
+  for (std::uint32_t left = lanes; left != 0; left &= left - 1) {
+    const int lane = std::countr_zero(left);
+    inside |= std::uint32_t{FilteredEdges::inside(edges, x + lane, y)} << lane;
+  }
+  return inside;
+}
+
+/// As FixedCut.
+template <int kEdges>
+class FilteredCut {
+ public:
+  HWY_INLINE FilteredCut(const TileTriangles& t, std::size_t i, const int (&cutting)[3], const PixelBox& tile,
+                         FillRule fill)
+      : t_(t), i_(i), tile_(tile), fill_(fill), error_(hn::Set(kFloats, t.error[i])) {
+    for (int k = 0; k < kEdges; ++k) {
+      const int e = cutting[k], from = kEdgeFrom[e], to = kEdgeTo[e];
+      const float sign = is_flipped(t.is_negative[i] != 0, e) ? -1.0f : 1.0f;
+      dx_[k] = hn::Set(kFloats, sign * (t.x[to][i] - t.x[from][i]));
+      dy_[k] = sign * (t.y[to][i] - t.y[from][i]);
+      ax_[k] = t.x[from][i];
+      ay_[k] = hn::Set(kFloats, t.y[from][i]);
+    }
+  }
+
+  HWY_INLINE void start(Integer columns, std::int32_t y0) {
+    x_ = hn::GetLane(columns);
+    y_ = tile_.y0 + y0;
+    sample_y_ = sample_of(integer(y_));
+    const Float sample_x = sample_of(hn::Add(columns, integer(tile_.x0)));
+    for (int k = 0; k < kEdges; ++k)
+      of_columns_[k] = hn::Mul(hn::Set(kFloats, dy_[k]), hn::Sub(sample_x, hn::Set(kFloats, ax_[k])));
+  }
+
+  HWY_INLINE IntegerMask next_row(IntegerMask in_box) {
+    if constexpr (kEdges == 0) return in_box;
+    const auto value = [&](int k) HWY_ATTR {
+      return hn::Sub(hn::Mul(dx_[k], hn::Sub(sample_y_, ay_[k])), of_columns_[k]);
+    };
+    Float smallest = value(0);
+    for (int k = 1; k < kEdges; ++k) smallest = hn::Min(smallest, value(k));
+    IntegerMask inside = hn::And(in_box, hn::RebindMask(kIntegers, hn::Gt(smallest, error_)));
+    const IntegerMask uncertain =
+        hn::And(in_box, hn::RebindMask(kIntegers, hn::Le(hn::Abs(smallest), error_)));
+    if (HWY_UNLIKELY(!hn::AllFalse(kIntegers, uncertain)))
+      inside = hn::Or(inside, mask_of(exactly_inside(t_, i_, fill_, tile_.x0 + x_, y_, bits_of(uncertain))));
+    sample_y_ = hn::Add(sample_y_, hn::Set(kFloats, 1.0f));  // exact: small multiples of one half
+    ++y_;
+    return inside;
+  }
+
+ private:
+  const TileTriangles& t_;
+  std::size_t i_;
+  const PixelBox& tile_;
+  FillRule fill_;
+  Float error_, dx_[3], ay_[3], of_columns_[3], sample_y_;
+  float dy_[3], ax_[3];
+  std::int32_t x_, y_;
+};
+
+/// What the loops need of a mode.
+struct FilteredArithmetic {
+  using Mode = Filtered;
+  static constexpr bool kIsExact = false;
+  using Coordinate = Float;
+  using Small = FilteredSmall;
+  using Triangles = FilteredTileTriangles;
+  template <int kEdges>
+  using Cut = FilteredCut<kEdges>;
+
+  static HWY_INLINE Float coordinate(Float pixels) { return pixels; }
+};
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace rasterbench
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target include guard
