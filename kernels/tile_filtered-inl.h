@@ -35,8 +35,8 @@ struct FilteredSetup {
     const Wide forth = x1 * y2, back = y1 * x2, area = forth - back;
     Wide certain_area;
     for (std::size_t i = 0; i < Wide::kParts; ++i) {  // the filter of FilteredEdges
-      const Double size = hn::Add(hn::Abs(forth.parts[i]), hn::Abs(back.parts[i]));
-      const auto exceeds = hn::Gt(hn::Abs(area.parts[i]), hn::Mul(hn::Set(kDoubles, 5 * 0x1p-53), size));
+      const Double magnitude = hn::Add(hn::Abs(forth.parts[i]), hn::Abs(back.parts[i]));
+      const auto exceeds = hn::Gt(hn::Abs(area.parts[i]), hn::Mul(hn::Set(kDoubles, 5 * 0x1p-53), magnitude));
       certain_area.parts[i] = hn::IfThenElseZero(exceeds, area.parts[i]);
     }
     const Float orientation = narrow(certain_area), zero = hn::Zero(kFloats);
@@ -52,10 +52,12 @@ struct FilteredSetup {
     plane.x0 = c[0].x;
     plane.y0 = c[0].y;
 
-    const Float width = hn::Sub(c[2].x, c[0].x);
-    const Float height =
-        hn::Sub(hn::Max(hn::Max(c[0].y, c[1].y), c[2].y), hn::Min(hn::Min(c[0].y, c[1].y), c[2].y));
-    Float size = zero;
+    // Beyond the extents by as much as a block of a small triangle's samples is.
+    const Float margin = hn::Set(kFloats, float{kSmallSide});
+    const Float width = hn::Add(hn::Sub(c[2].x, c[0].x), margin);
+    const Float height = hn::Add(
+        hn::Sub(hn::Max(hn::Max(c[0].y, c[1].y), c[2].y), hn::Min(hn::Min(c[0].y, c[1].y), c[2].y)), margin);
+    size = zero;
     for (int e = 0; e < 3; ++e) {
       const FloatCorner &from = c[kEdgeFrom[e]], &to = c[kEdgeTo[e]];
       const Float ex = hn::Sub(to.x, from.x), ey = hn::Sub(to.y, from.y);
@@ -64,8 +66,6 @@ struct FilteredSetup {
       dy[e] = hn::IfThenElse(flip, hn::Neg(ey), ey);
       size = hn::Max(size, hn::Add(hn::Mul(hn::Abs(ex), height), hn::Mul(hn::Abs(ey), width)));
     }
-    // The 5 of FilteredEdges, and ample for the roundings of these lines in float32.
-    error = hn::Add(hn::Mul(size, hn::Set(kFloats, 6 * 0x1p-24f)), hn::Set(kFloats, 0x1p-120f));
     is_negative = negative;
   }
 
@@ -73,60 +73,59 @@ struct FilteredSetup {
   IntegerMask is_certain;  ///< the orientation; other lanes hold nothing of use
   FloatMask is_negative;   ///< the orientation
   Float dx[3], dy[3];      ///< the inside turned positive
-  Float error;             ///< of every edge function, in px^2, at samples of the triangle's own box
+  /// Of every edge function, in px^2, at samples within or kSmallSide px beyond the triangle's extents: its
+  /// absolute value and those of its two products are below. Rounded in float32.
+  Float size;
 };
+
+/// The rounding of `size` and of an error are paid by those who count one u more than they need.
+constexpr float kUnit = 0x1p-24f;
+/// More than what underflow adds to an error.
+constexpr float kUnderflow = 0x1p-120f;
 
 /// As FixedSmall.
 class FilteredSmall {
  public:
-  /// Of sorted corners.
+  /// Of sorted corners. A sample beyond a box is outside of an edge, as exact arithmetic will say where the
+  /// floats do not.
   HWY_INLINE FilteredSmall(const FloatCorner (&corners)[3], const LaneBox& box, IntegerMask lanes, FillRule) {
     const FilteredSetup setup(corners);
     plane = setup.plane;
-    in_lanes = setup.is_certain;
-    draws = hn::And(lanes, in_lanes);
-    error_ = setup.error;
-    // Beyond its box a triangle has no bound, and covers nothing: an infinite part of an edge function says
-    // so.
-    const Float never = hn::Set(kFloats, std::numeric_limits<float>::infinity());
+    draws = hn::And(lanes, setup.is_certain);
+    const Float x = sample_of(box.x0), y = sample_of(box.y0);
     for (int e = 0; e < 3; ++e) {
-      dx_[e] = setup.dx[e];
-      ay_[e] = corners[kEdgeFrom[e]].y;
-      for (int column = 0; column < kSmallSide; ++column) {
-        const Float x = sample_of(hn::Add(box.x0, integer(column)));
-        of_columns_[e][column] = hn::Mul(setup.dy[e], hn::Sub(x, corners[kEdgeFrom[e]].x));
-      }
+      const FloatCorner& from = corners[kEdgeFrom[e]];
+      value_of_row_[e] =
+          hn::Sub(hn::Mul(setup.dx[e], hn::Sub(y, from.y)), hn::Mul(setup.dy[e], hn::Sub(x, from.x)));
+      per_column_[e] = setup.dy[e];
+      per_row_[e] = setup.dx[e];
     }
-    for (int column = 0; column < kSmallSide; ++column) {
-      const IntegerMask in_box = hn::And(draws, hn::Lt(hn::Add(box.x0, integer(column)), box.x1));
-      of_columns_[0][column] = hn::IfThenElse(hn::RebindMask(kFloats, in_box), of_columns_[0][column], never);
-    }
-    rows_left_ = hn::Sub(box.y1, box.y0);
-    sample_y_ = sample_of(box.y0);
+    value_of_row_[0] = hn::IfThenElse(hn::RebindMask(kFloats, draws), value_of_row_[0],
+                                      hn::Set(kFloats, -std::numeric_limits<float>::infinity()));
+    // 5 for the first sample, as in FilteredEdges; each of three steps down and three to the right adds the
+    // rounding of its sum and that of dx or dy, which moves a value by less than its products in all.
+    error_ =
+        hn::Add(hn::Mul(setup.size, hn::Set(kFloats, (5 + 6 + 2 + 1) * kUnit)), hn::Set(kFloats, kUnderflow));
   }
 
   HWY_INLINE void start_row() {
-    for (int e = 0; e < 3; ++e) of_row_[e] = hn::Mul(dx_[e], hn::Sub(sample_y_, ay_[e]));
-    of_row_[0] = hn::IfThenElse(hn::RebindMask(kFloats, hn::Gt(rows_left_, hn::Zero(kIntegers))), of_row_[0],
-                                hn::Set(kFloats, -std::numeric_limits<float>::infinity()));
-    rows_left_ = hn::Sub(rows_left_, integer(1));
-    sample_y_ = hn::Add(sample_y_, hn::Set(kFloats, 1.0f));  // exact: small multiples of one half
+    for (int e = 0; e < 3; ++e) {
+      value_[e] = value_of_row_[e];
+      value_of_row_[e] = hn::Add(value_of_row_[e], per_row_[e]);
+    }
   }
-  HWY_INLINE LaneCoverage coverage(int column) const {
-    const auto value = [&](int e) HWY_ATTR { return hn::Sub(of_row_[e], of_columns_[e][column]); };
-    const Float smallest = hn::Min(hn::Min(value(0), value(1)), value(2));
+  HWY_INLINE LaneCoverage coverage(int) {
+    const Float smallest = hn::Min(hn::Min(value_[0], value_[1]), value_[2]);
+    for (int e = 0; e < 3; ++e) value_[e] = hn::Sub(value_[e], per_column_[e]);
     return {hn::RebindMask(kIntegers, hn::Ge(smallest, hn::Neg(error_))),
             hn::RebindMask(kIntegers, hn::Gt(smallest, error_))};
   }
 
   LanePlane plane;
-  IntegerMask draws;
-  IntegerMask in_lanes;  ///< the others need the scalar specification
+  IntegerMask draws;  ///< has an area for certain
 
  private:
-  Float dx_[3], ay_[3], error_, sample_y_;
-  Integer rows_left_;
-  Float of_columns_[3][kSmallSide], of_row_[3];
+  Float value_of_row_[3], value_[3], per_column_[3], per_row_[3], error_;
 };
 
 /// As FixedTileTriangles.
@@ -144,6 +143,9 @@ class FilteredTileTriangles {
     plane = setup_.plane;
     draws = hn::And(lanes, box.holds_a_sample());
     in_lanes = setup_.is_certain;
+    // 5 as in FilteredEdges.
+    error_ = hn::Add(hn::Mul(setup_.size, hn::Set(kFloats, (5 + 1) * kUnit)), hn::Set(kFloats, kUnderflow));
+    error_of_steps_ = hn::Zero(kFloats);
     x0_ = sample_of(hn::Add(box.x0, left));
     y0_ = sample_of(hn::Add(box.y0, top));
     x1_ = sample_of(hn::Add(hn::Sub(box.x1, one), left));
@@ -151,8 +153,8 @@ class FilteredTileTriangles {
   }
 
   /// Each operation of an edge function rounds monotonically: its smallest and largest values over the box
-  /// are those at two corners, where the bound holds. What is certain there is certain at every sample.
-  HWY_INLINE EdgeCut cut_by(int e) const {
+  /// are those at two corners. What is certain there is certain at every sample.
+  HWY_INLINE EdgeCut cut_by(int e) {
     const FloatCorner& from = corners_[kEdgeFrom[e]];
     const Float of_y0 = hn::Mul(setup_.dx[e], hn::Sub(y0_, from.y)),
                 of_y1 = hn::Mul(setup_.dx[e], hn::Sub(y1_, from.y));
@@ -160,8 +162,15 @@ class FilteredTileTriangles {
                 of_x1 = hn::Mul(setup_.dy[e], hn::Sub(x1_, from.x));
     const Float largest = hn::Sub(hn::Max(of_y0, of_y1), hn::Min(of_x0, of_x1));
     const Float smallest = hn::Sub(hn::Min(of_y0, of_y1), hn::Max(of_x0, of_x1));
-    return {hn::RebindMask(kIntegers, hn::Lt(largest, hn::Neg(setup_.error))),
-            hn::RebindMask(kIntegers, hn::Le(smallest, setup_.error))};
+    const FloatMask misses = hn::Lt(largest, hn::Neg(error_)), cuts = hn::Le(smallest, error_);
+    // FilteredCut goes from the first sample of the box through samples of the box. With m, the most that the
+    // edge function is there: 2 u for each of dx and dy, which move it by at most 2 m, and one for their
+    // product and each sum.
+    const Float most = hn::Max(hn::Abs(smallest), hn::Abs(largest));
+    const Float steps = hn::ConvertTo(kFloats, hn::Add(hn::Sub(box.y1, box.y0), integer(8)));
+    const Float of_steps = hn::Mul(hn::Mul(steps, most), hn::Set(kFloats, kUnit));
+    error_of_steps_ = hn::Max(error_of_steps_, hn::IfThenElseZero(cuts, of_steps));
+    return {hn::RebindMask(kIntegers, misses), hn::RebindMask(kIntegers, cuts)};
   }
 
   HWY_INLINE void store_edges(IntegerMask lanes, TileTriangles& out) const {
@@ -169,7 +178,7 @@ class FilteredTileTriangles {
       store(corners_[i].x, lanes, out.x[i] + out.size);
       store(corners_[i].y, lanes, out.y[i] + out.size);
     }
-    store(setup_.error, lanes, out.error + out.size);
+    store(hn::Add(error_, error_of_steps_), lanes, out.error + out.size);
     store(hn::IfThenElseZero(hn::RebindMask(kIntegers, setup_.is_negative), integer(1)), lanes,
           out.is_negative + out.size);
   }
@@ -183,6 +192,8 @@ class FilteredTileTriangles {
   const FloatCorner (&corners_)[3];
   FilteredSetup setup_;
   Float x0_, y0_, x1_, y1_;  // the samples at the corners of the box
+  Float error_;              // of an edge function at one sample
+  Float error_of_steps_;     // what going from sample to sample adds
 };
 
 /// Which of the samples from pixel (x, y) on that `lanes` asks for, as bits, are inside of triangle i. By the
@@ -211,38 +222,36 @@ class FilteredCut {
   HWY_INLINE FilteredCut(const TileTriangles& t, std::size_t i, const int (&cutting)[3], const PixelBox& tile,
                          FillRule fill)
       : t_(t), i_(i), tile_(tile), fill_(fill), error_(hn::Set(kFloats, t.error[i])) {
+    const float x = static_cast<float>(tile.x0 + t.x0[i]) + 0.5f;
+    const float y = static_cast<float>(tile.y0 + t.y0[i]) + 0.5f;
     for (int k = 0; k < kEdges; ++k) {
       const int e = cutting[k], from = kEdgeFrom[e], to = kEdgeTo[e];
       const float sign = is_flipped(t.is_negative[i] != 0, e) ? -1.0f : 1.0f;
-      dx_[k] = hn::Set(kFloats, sign * (t.x[to][i] - t.x[from][i]));
-      dy_[k] = sign * (t.y[to][i] - t.y[from][i]);
-      ax_[k] = t.x[from][i];
-      ay_[k] = hn::Set(kFloats, t.y[from][i]);
+      const float dx = sign * (t.x[to][i] - t.x[from][i]), dy = sign * (t.y[to][i] - t.y[from][i]);
+      first_[k] = dx * (y - t.y[from][i]) - dy * (x - t.x[from][i]);
+      per_column_[k] = dy;
+      per_row_[k] = hn::Set(kFloats, dx);
     }
   }
 
   HWY_INLINE void start(Integer columns, std::int32_t y0) {
-    x_ = hn::GetLane(columns);
+    x_ = tile_.x0 + hn::GetLane(columns);
     y_ = tile_.y0 + y0;
-    sample_y_ = sample_of(integer(y_));
-    const Float sample_x = sample_of(hn::Add(columns, integer(tile_.x0)));
+    const Float steps = hn::ConvertTo(kFloats, hn::Sub(columns, integer(t_.x0[i_])));
     for (int k = 0; k < kEdges; ++k)
-      of_columns_[k] = hn::Mul(hn::Set(kFloats, dy_[k]), hn::Sub(sample_x, hn::Set(kFloats, ax_[k])));
+      value_[k] = hn::Sub(hn::Set(kFloats, first_[k]), hn::Mul(hn::Set(kFloats, per_column_[k]), steps));
   }
 
   HWY_INLINE IntegerMask next_row(IntegerMask in_box) {
     if constexpr (kEdges == 0) return in_box;
-    const auto value = [&](int k) HWY_ATTR {
-      return hn::Sub(hn::Mul(dx_[k], hn::Sub(sample_y_, ay_[k])), of_columns_[k]);
-    };
-    Float smallest = value(0);
-    for (int k = 1; k < kEdges; ++k) smallest = hn::Min(smallest, value(k));
+    Float smallest = value_[0];
+    for (int k = 1; k < kEdges; ++k) smallest = hn::Min(smallest, value_[k]);
+    for (int k = 0; k < kEdges; ++k) value_[k] = hn::Add(value_[k], per_row_[k]);
     IntegerMask inside = hn::And(in_box, hn::RebindMask(kIntegers, hn::Gt(smallest, error_)));
     const IntegerMask uncertain =
         hn::And(in_box, hn::RebindMask(kIntegers, hn::Le(hn::Abs(smallest), error_)));
     if (HWY_UNLIKELY(!hn::AllFalse(kIntegers, uncertain)))
-      inside = hn::Or(inside, mask_of(exactly_inside(t_, i_, fill_, tile_.x0 + x_, y_, bits_of(uncertain))));
-    sample_y_ = hn::Add(sample_y_, hn::Set(kFloats, 1.0f));  // exact: small multiples of one half
+      inside = hn::Or(inside, mask_of(exactly_inside(t_, i_, fill_, x_, y_, bits_of(uncertain))));
     ++y_;
     return inside;
   }
@@ -252,8 +261,8 @@ class FilteredCut {
   std::size_t i_;
   const PixelBox& tile_;
   FillRule fill_;
-  Float error_, dx_[3], ay_[3], of_columns_[3], sample_y_;
-  float dy_[3], ax_[3];
+  Float error_, value_[3], per_row_[3];
+  float first_[3], per_column_[3];
   std::int32_t x_, y_;
 };
 

@@ -209,7 +209,7 @@ HWY_INLINE TinySamples sample_tiny(const LaneCornerOf<typename Arithmetic::Coord
   for (int row = 0; row < TinySamples::kSide; ++row) {
     const Integer y = hn::Add(box.y0, integer(row));
     const Float of_row = depth_of_row(plane, sample_of(y));
-    const IntegerMask in_row = hn::And(triangles.draws, hn::Lt(y, box.y1));
+    const IntegerMask in_row = hn::Lt(y, box.y1);
     triangles.start_row();
     for (int column = 0; column < TinySamples::kSide; ++column) {
       const int i = row * TinySamples::kSide + column;
@@ -425,7 +425,7 @@ void set_up(const TriangleStreams::Block& block, const TileSettings& settings, T
                     Arithmetic::coordinate(hn::BitCast(kFloats, field(3 + i))),
                     hn::BitCast(kFloats, field(6 + i))};
     sort_corners(corners);
-    const typename Arithmetic::Triangles triangles(valid, corners, tile.box, settings.fill);
+    typename Arithmetic::Triangles triangles(valid, corners, tile.box, settings.fill);
     const LanePlane& plane = triangles.plane;
     const LaneBox& box = triangles.box;
     for (std::uint32_t alone = bits_of(hn::AndNot(triangles.in_lanes, triangles.draws)); alone != 0;
