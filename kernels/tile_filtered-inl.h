@@ -196,32 +196,31 @@ class FilteredTileTriangles {
   Float error_of_steps_;     // what going from sample to sample adds
 };
 
-/// Which of the samples from pixel (x, y) on that `lanes` asks for, as bits, are inside of triangle i. By the
-/// scalar specification; out of line: it is rare.
-HWY_NOINLINE std::uint32_t exactly_inside(const TileTriangles& t, std::size_t i, FillRule fill,
-                                          std::int32_t x, std::int32_t y, std::uint32_t lanes) {
-  ScreenTriangle<float> triangle{};
-  for (int corner = 0; corner < 3; ++corner) {
-    triangle.x[corner] = t.x[corner][i];
-    triangle.y[corner] = t.y[corner][i];
+/// FilteredEdges::inside() of triangle i.
+class ExactTriangle {
+ public:
+  ExactTriangle(const TileTriangles& t, std::size_t i, FillRule fill) {
+    ScreenTriangle<float> triangle{};
+    for (int corner = 0; corner < 3; ++corner) {
+      triangle.x[corner] = t.x[corner][i];
+      triangle.y[corner] = t.y[corner][i];
+    }
+    FilteredEdges::setup(triangle, fill, edges_);
   }
-  FilteredEdges::Setup edges;
-  FilteredEdges::setup(triangle, fill, edges);
-  std::uint32_t inside = 0;
-  for (std::uint32_t left = lanes; left != 0; left &= left - 1) {
-    const int lane = std::countr_zero(left);
-    inside |= std::uint32_t{FilteredEdges::inside(edges, x + lane, y)} << lane;
-  }
-  return inside;
-}
 
-/// As FixedCut.
+  bool covers(std::int32_t x, std::int32_t y) const { return FilteredEdges::inside(edges_, x, y); }
+
+ private:
+  FilteredEdges::Setup edges_;
+};
+
+/// As FixedCut. What is uncertain counts as outside and is told after the last row, so that the rows have no
+/// way out.
 template <int kEdges>
 class FilteredCut {
  public:
-  HWY_INLINE FilteredCut(const TileTriangles& t, std::size_t i, const int (&cutting)[3], const PixelBox& tile,
-                         FillRule fill)
-      : t_(t), i_(i), tile_(tile), fill_(fill), error_(hn::Set(kFloats, t.error[i])) {
+  HWY_INLINE FilteredCut(const TileTriangles& t, std::size_t i, const int (&cutting)[3], const PixelBox& tile)
+      : first_column_(t.x0[i]), error_(hn::Set(kFloats, t.error[i])) {
     const float x = static_cast<float>(tile.x0 + t.x0[i]) + 0.5f;
     const float y = static_cast<float>(tile.y0 + t.y0[i]) + 0.5f;
     for (int k = 0; k < kEdges; ++k) {
@@ -234,10 +233,9 @@ class FilteredCut {
     }
   }
 
-  HWY_INLINE void start(Integer columns, std::int32_t y0) {
-    x_ = tile_.x0 + hn::GetLane(columns);
-    y_ = tile_.y0 + y0;
-    const Float steps = hn::ConvertTo(kFloats, hn::Sub(columns, integer(t_.x0[i_])));
+  HWY_INLINE void start(Integer columns, std::int32_t) {
+    least_ = hn::Set(kFloats, std::numeric_limits<float>::infinity());
+    const Float steps = hn::ConvertTo(kFloats, hn::Sub(columns, integer(first_column_)));
     for (int k = 0; k < kEdges; ++k)
       value_[k] = hn::Sub(hn::Set(kFloats, first_[k]), hn::Mul(hn::Set(kFloats, per_column_[k]), steps));
   }
@@ -247,23 +245,21 @@ class FilteredCut {
     Float smallest = value_[0];
     for (int k = 1; k < kEdges; ++k) smallest = hn::Min(smallest, value_[k]);
     for (int k = 0; k < kEdges; ++k) value_[k] = hn::Add(value_[k], per_row_[k]);
-    IntegerMask inside = hn::And(in_box, hn::RebindMask(kIntegers, hn::Gt(smallest, error_)));
-    const IntegerMask uncertain =
-        hn::And(in_box, hn::RebindMask(kIntegers, hn::Le(hn::Abs(smallest), error_)));
-    if (HWY_UNLIKELY(!hn::AllFalse(kIntegers, uncertain)))
-      inside = hn::Or(inside, mask_of(exactly_inside(t_, i_, fill_, x_, y_, bits_of(uncertain))));
-    ++y_;
-    return inside;
+    least_ = hn::Min(least_, hn::Abs(smallest));
+    return hn::And(in_box, hn::RebindMask(kIntegers, hn::Gt(smallest, error_)));
+  }
+  /// Columns of `in_box` in which a sample is uncertain, of the rows since start() or since this was asked
+  /// last.
+  HWY_INLINE IntegerMask take_uncertain(IntegerMask in_box) {
+    const IntegerMask uncertain = hn::And(in_box, hn::RebindMask(kIntegers, hn::Le(least_, error_)));
+    least_ = hn::Set(kFloats, std::numeric_limits<float>::infinity());
+    return uncertain;
   }
 
  private:
-  const TileTriangles& t_;
-  std::size_t i_;
-  const PixelBox& tile_;
-  FillRule fill_;
-  Float error_, value_[3], per_row_[3];
+  std::int32_t first_column_;
+  Float error_, least_, value_[3], per_row_[3];
   float first_[3], per_column_[3];
-  std::int32_t x_, y_;
 };
 
 /// What the loops need of a mode.

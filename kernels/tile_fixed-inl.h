@@ -201,8 +201,7 @@ class FixedTileTriangles {
 template <int kEdges>
 class FixedCut {
  public:
-  HWY_INLINE FixedCut(const TileTriangles& t, std::size_t i, const int (&cutting)[3], const PixelBox&,
-                      FillRule)
+  HWY_INLINE FixedCut(const TileTriangles& t, std::size_t i, const int (&cutting)[3], const PixelBox&)
       : t_(t), i_(i), cutting_(cutting) {}
 
   /// `columns` and rows from y0 on count from the tile's first pixel.

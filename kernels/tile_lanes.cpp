@@ -9,6 +9,7 @@
 
 #include "base/isa_dispatch.h"
 #include "kernels/fragments.h"
+#include "numeric/depth.h"
 #include "numeric/modes.h"
 #include "pipeline/resolve.h"
 
@@ -483,6 +484,30 @@ HWY_INLINE void keep(IntegerMask inside, Float depth, Integer rank, float* depth
   hn::BlendedStore(rank, kept, kIntegers, ranks);
 }
 
+/// Draws the samples of triangle i that floats leave uncertain, in `columns` of its box. Out of line: it is
+/// rare.
+template <class Arithmetic, int kEdges>
+HWY_NOINLINE void draw_uncertain(const TileTriangles& t, std::size_t i, const int (&cutting)[3],
+                                 FillRule fill, std::int32_t x, TilePixels tile) {
+  const Integer columns = hn::Iota(kIntegers, x);
+  const IntegerMask in_box = hn::Lt(columns, integer(t.x1[i]));
+  const ExactTriangle triangle(t, i, fill);
+  const DepthPlane<float> plane{t.d0[i], t.gx[i], t.gy[i], t.low[i], t.high[i]};
+  typename Arithmetic::template Cut<kEdges> edges(t, i, cutting, tile.box);
+  edges.start(columns, t.y0[i]);
+  for (std::int32_t y = t.y0[i]; y < t.y1[i]; ++y) {
+    edges.next_row(in_box);
+    for (std::uint32_t left = bits_of(edges.take_uncertain(in_box)); left != 0; left &= left - 1) {
+      const std::int32_t column = x + std::countr_zero(left);
+      const std::int32_t image_x = tile.box.x0 + column, image_y = tile.box.y0 + y;
+      if (!triangle.covers(image_x, image_y)) continue;
+      const float depth = plane.at((static_cast<float>(image_x) + 0.5f) - t.px[i],
+                                   (static_cast<float>(image_y) + 0.5f) - t.py[i]);
+      tile.keep(y * tile.pitch + column, depth, t.ranks[i]);
+    }
+  }
+}
+
 /// Draws triangle i, whose box is cut by the edges `cutting`; the others need no look.
 template <class Arithmetic, int kEdges>
 HWY_INLINE void draw_triangle(const TileTriangles& t, std::size_t i, const int (&cutting)[3], FillRule fill,
@@ -494,7 +519,7 @@ HWY_INLINE void draw_triangle(const TileTriangles& t, std::size_t i, const int (
   const Integer rank = integer(t.ranks[i]);
   const float first_y = static_cast<float>(tile.box.y0 + y0) + 0.5f;
   const std::int64_t pitch = tile.pitch;
-  typename Arithmetic::template Cut<kEdges> edges(t, i, cutting, tile.box, fill);
+  typename Arithmetic::template Cut<kEdges> edges(t, i, cutting, tile.box);
   for (std::int32_t x = t.x0[i]; x < x1; x += kWidth) {
     const Integer columns = hn::Iota(kIntegers, x);
     const IntegerMask in_box = hn::Lt(columns, integer(x1));
@@ -508,6 +533,9 @@ HWY_INLINE void draw_triangle(const TileTriangles& t, std::size_t i, const int (
       const float of_row = d0 + gy * (sample_y - py);
       keep(inside, clamped(hn::Add(hn::Set(kFloats, of_row), of_columns), low, high), rank, depths, ranks);
     }
+    if constexpr (!Arithmetic::kIsExact && kEdges > 0)
+      if (HWY_UNLIKELY(!hn::AllFalse(kIntegers, edges.take_uncertain(in_box))))
+        draw_uncertain<Arithmetic, kEdges>(t, i, cutting, fill, x, tile);
   }
 }
 

@@ -36,11 +36,6 @@ HWY_INLINE std::uint32_t bits_of(IntegerMask mask) {
   return bytes[0] | std::uint32_t{bytes[1]} << 8;  // at most 16 lanes
 }
 
-HWY_INLINE IntegerMask mask_of(std::uint32_t bits) {
-  const std::uint8_t bytes[8] = {static_cast<std::uint8_t>(bits), static_cast<std::uint8_t>(bits >> 8)};
-  return hn::LoadMaskBits(kIntegers, bytes);
-}
-
 /// Side in pixels of the boxes of small triangles.
 constexpr int kSmallSide = 4;
 
