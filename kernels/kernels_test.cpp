@@ -45,14 +45,13 @@ Scene crossing_near() {
   return from_front(triangles);
 }
 
-/// Triangles whose edges run through pixel centres, each twice with opposite windings: ties everywhere.
-Scene lattice() {
+/// Triangles whose edges run through pixel centres, each twice with opposite windings: ties everywhere. Of an
+/// image of 32 px, 8 cells a side have 4 px, and 32 cells have one, whose centre lies on the diagonal.
+Scene lattice(int cells = 8) {
   std::vector<Triangle> triangles;
-  const auto at = [](int i) {
-    return static_cast<float>(i) * 0.75f - 3.0f;
-  };  // 8 cells over 6 units: 4 px of a 32 px image
-  for (int i = 0; i < 8; ++i)
-    for (int j = 0; j < 8; ++j) {
+  const auto at = [&](int i) { return static_cast<float>(i) * 6.0f / static_cast<float>(cells) - 3.0f; };
+  for (int i = 0; i < cells; ++i)
+    for (int j = 0; j < cells; ++j) {
       const Vec3 a{at(j), at(i), 0}, b{at(j + 1), at(i), 0}, c{at(j + 1), at(i + 1), 0},
           d{at(j), at(i + 1), 0};
       for (const Triangle& t : {triangle(a, b, c), triangle(a, c, d), triangle(c, b, a), triangle(d, c, a)})
@@ -131,6 +130,7 @@ std::vector<TestScene> test_scenes() {
   scenes.push_back({"slivers", slivers(), 32, 32});
   scenes.push_back({"uncertain", uncertain(), 32, 32});
   // Up to here: kScenesOfEveryMode.
+  scenes.push_back({"fine lattice", lattice(32), 32, 32});
   scenes.push_back({"confetti 1x1", confetti, 1, 1});
   scenes.push_back({"confetti 1000x1", confetti, 1000, 1});
   scenes.push_back({"teapot", generate("teapot:triangles=500"), 67, 49});
