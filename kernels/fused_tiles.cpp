@@ -7,6 +7,12 @@
 // picture written once. Abrash, Rasterization on Larrabee, 2009, has the tiles and triangles in lanes; Laine
 // & Karras, High-performance software rasterization on GPUs, 2011, the size classes.
 //
+// Modes: fixed_8 in integers, and filtered in float32 with error bounds, which leaves to the scalar
+// specification what it cannot decide (tile_filtered-inl.h). At 1920x1080 on one thread filtered takes 1.06
+// to 1.09 times the time of fixed_8 for triangles of 2 to 450 pixels, most of it for orientations and
+// gradients in double and for bounds, and 1.01 to 1.03 times for large ones (AVX-512; 1.01 to 1.05 with
+// AVX2).
+//
 // Memory: the streams take 12 bytes for each fragment of a tiny triangle and 40 bytes for each tile that
 // another triangle's box touches, in blocks that each worker keeps between frames. Where a scene would fill
 // more than the budget of the streams (RendererSetup), the frame is drawn in rounds: front end until it is

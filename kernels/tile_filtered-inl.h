@@ -73,12 +73,12 @@ struct FilteredSetup {
   IntegerMask is_certain;  ///< the orientation; other lanes hold nothing of use
   FloatMask is_negative;   ///< the orientation
   Float dx[3], dy[3];      ///< the inside turned positive
-  /// Of every edge function, in px^2, at samples within or kSmallSide px beyond the triangle's extents: its
-  /// absolute value and those of its two products are below. Rounded in float32.
+  /// In px^2, above |dx (y - ay)| + |dy (x - ax)| of every edge at samples within or kSmallSide px beyond the
+  /// triangle's extents. Rounded in float32.
   Float size;
 };
 
-/// The rounding of `size` and of an error are paid by those who count one u more than they need.
+/// u of float32. The roundings of `size` and of an error are paid by counting one u more than is needed.
 constexpr float kUnit = 0x1p-24f;
 /// More than what underflow adds to an error.
 constexpr float kUnderflow = 0x1p-120f;
@@ -153,7 +153,8 @@ class FilteredTileTriangles {
   }
 
   /// Each operation of an edge function rounds monotonically: its smallest and largest values over the box
-  /// are those at two corners. What is certain there is certain at every sample.
+  /// are those at two corners. What is certain there is certain at every sample. To be asked of each edge
+  /// before store_edges(), which needs the errors of those that cut.
   HWY_INLINE EdgeCut cut_by(int e) {
     const FloatCorner& from = corners_[kEdgeFrom[e]];
     const Float of_y0 = hn::Mul(setup_.dx[e], hn::Sub(y0_, from.y)),
@@ -163,9 +164,10 @@ class FilteredTileTriangles {
     const Float largest = hn::Sub(hn::Max(of_y0, of_y1), hn::Min(of_x0, of_x1));
     const Float smallest = hn::Sub(hn::Min(of_y0, of_y1), hn::Max(of_x0, of_x1));
     const FloatMask misses = hn::Lt(largest, hn::Neg(error_)), cuts = hn::Le(smallest, error_);
-    // FilteredCut goes from the first sample of the box through samples of the box. With m, the most that the
-    // edge function is there: 2 u for each of dx and dy, which move it by at most 2 m, and one for their
-    // product and each sum.
+    // FilteredCut goes from the first sample of the box through samples of the box, where the edge function
+    // is at most m. Along a side of the box it changes by at most 2 m: dx, dy and the product with dy carry a
+    // rounding of 2 u m each, and each sum one of u m, in all (rows + 6) u m, and 2 for what is of second
+    // order.
     const Float most = hn::Max(hn::Abs(smallest), hn::Abs(largest));
     const Float steps = hn::ConvertTo(kFloats, hn::Add(hn::Sub(box.y1, box.y0), integer(8)));
     const Float of_steps = hn::Mul(hn::Mul(steps, most), hn::Set(kFloats, kUnit));
