@@ -55,6 +55,7 @@ class FusedTiles final : public Renderer {
         permutation_seed_(setup.permutation_seed),
         stream_budget_(setup.stream_budget),
         count_(setup.count),
+        is_fixed_(mode == Fixed8::kInfo.name),
         execution_(make_execution(setup.execution)),
         lanes_(tile_lanes(settings_.geometry.isa, mode)),
         tile_settings_{.grid = TileGrid(settings_.width, settings_.height, tile_shift(settings_.tile)),
@@ -272,9 +273,12 @@ class FusedTiles final : public Renderer {
 
   void count_rest(WorkCounters& counters) {
     ScreenTriangles<float> screen(triangles().size());
-    screen.transform(triangles(), make_screen_transform(camera_, Fixed8::kDepthFunction), settings_.geometry,
+    screen.transform(triangles(), make_screen_transform(camera_, kDepthFunction), settings_.geometry,
                      *execution_);
-    count_boxes<Fixed8>({screen.span(), settings_, tile_settings_.triangle_count}, counters);
+    if (is_fixed_)
+      count_boxes<Fixed8>({screen.span(), settings_, tile_settings_.triangle_count}, counters);
+    else
+      count_boxes<Filtered>({screen.span(), settings_, tile_settings_.triangle_count}, counters);
     if (ids_.size() > 0) count_visible(ids(), counters);
     counters.hidden_entries = 0;
     for (const auto& worker : workers_) *counters.hidden_entries += worker->scratch.hidden_entries;
@@ -302,6 +306,7 @@ class FusedTiles final : public Renderer {
   std::uint64_t permutation_seed_;
   std::size_t stream_budget_;
   bool count_;
+  bool is_fixed_;  ///< fixed_8, else filtered
   std::unique_ptr<Execution> execution_;
   const TileLanes& lanes_;
   TileSettings tile_settings_;

@@ -707,8 +707,7 @@ void draw(const TileTask& task, const TileSettings& settings, TileScratch& scrat
   for (const FrontEnd* front_end : task.front_ends)
     for (auto block = front_end->triangles.blocks(task.tile); block != nullptr; block = block->next) {
       set_up<Arithmetic>(*block, settings, tile, triangles);
-      if (triangles.size >= TileTriangles::kSize)
-        draw_triangles<Arithmetic>(scratch, settings, tile);
+      if (triangles.size >= TileTriangles::kSize) draw_triangles<Arithmetic>(scratch, settings, tile);
     }
   draw_triangles<Arithmetic>(scratch, settings, tile);
   for (const FrontEnd* front_end : task.front_ends)
