@@ -168,14 +168,12 @@ void select(const ScreenBatch<float>& in, const TileSettings& settings, FrontEnd
     const Integer touched = hn::Mul(hn::Add(hn::Sub(corner.x1, corner.x0), integer(1)),
                                     hn::Add(hn::Sub(corner.y1, corner.y0), integer(1)));
     tiles = hn::Add(tiles, hn::IfThenElseZero(draws, touched));
-    const FloatMask draws_float = hn::RebindMask(kFloats, draws);
     for (int i = 0; i < 3; ++i) {
-      hn::StoreU(hn::Compress(px[i], draws_float), kFloats, out.x[i] + size);
-      hn::StoreU(hn::Compress(py[i], draws_float), kFloats, out.y[i] + size);
-      hn::StoreU(hn::Compress(hn::Load(kFloats, in.d[i] + first), draws_float), kFloats, out.d[i] + size);
+      store(px[i], draws, out.x[i] + size);
+      store(py[i], draws, out.y[i] + size);
+      store(hn::Load(kFloats, in.d[i] + first), draws, out.d[i] + size);
     }
-    const Integer ranks = first_wins ? ids : hn::Sub(last_id, ids);
-    hn::StoreU(hn::Compress(ranks, draws), kIntegers, out.ranks + size);
+    store(first_wins ? ids : hn::Sub(last_id, ids), draws, out.ranks + size);
     size += hn::CountTrue(kIntegers, draws);
   }
   alignas(64) std::int32_t sums[kLanes];
@@ -241,7 +239,7 @@ HWY_INLINE void for_each_tile(IntegerMask lanes, Integer tiles, Visit visit) {
 }
 
 HWY_INLINE void append(Integer v, IntegerMask mask, std::uint32_t* to) {
-  hn::StoreU(hn::BitCast(kCodes, hn::Compress(v, mask)), kCodes, to);
+  hn::StoreU(hn::BitCast(kCodes, compressed(v, mask)), kCodes, to);
 }
 HWY_INLINE void append(Float v, IntegerMask mask, std::uint32_t* to) {
   append(hn::BitCast(kIntegers, v), mask, to);
@@ -472,6 +470,16 @@ void set_up(const TriangleStreams::Block& block, const TileSettings& settings, T
   }
 }
 
+/// Stores the lanes of `mask`; the others hold `old`, which is what is there.
+template <class V, class Mask, class D>
+HWY_INLINE void store_where(V v, Mask mask, V old, D d, hn::TFromD<D>* to) {
+#if HWY_TARGET == HWY_AVX3
+  hn::BlendedStore(v, mask, d, to);
+#else  // masked stores are slow before AVX-512
+  hn::StoreU(hn::IfThenElse(mask, v, old), d, to);
+#endif
+}
+
 /// Keeps the fragments of `inside` whose keys are smaller than those of the pixels.
 HWY_INLINE void keep(IntegerMask inside, Float depth, Integer rank, float* depths, std::int32_t* ranks) {
   const Float old_depth = hn::LoadU(kFloats, depths);
@@ -480,8 +488,8 @@ HWY_INLINE void keep(IntegerMask inside, Float depth, Integer rank, float* depth
   const IntegerMask tied =
       hn::And(hn::RebindMask(kIntegers, hn::Eq(depth, old_depth)), hn::Lt(rank, old_rank));
   const IntegerMask kept = hn::And(inside, hn::Or(nearer, tied));
-  hn::BlendedStore(depth, hn::RebindMask(kFloats, kept), kFloats, depths);
-  hn::BlendedStore(rank, kept, kIntegers, ranks);
+  store_where(depth, hn::RebindMask(kFloats, kept), old_depth, kFloats, depths);
+  store_where(rank, kept, old_rank, kIntegers, ranks);
 }
 
 /// Draws the samples of triangle i that floats leave uncertain, in `columns` of its box. Out of line: it is
