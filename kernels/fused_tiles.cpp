@@ -21,7 +21,6 @@
 
 #include <atomic>
 #include <bit>
-#include <chrono>
 #include <numeric>
 
 #include "kernels/kernel.h"
@@ -94,9 +93,9 @@ class FusedTiles final : public Renderer {
     bool first_round = true, last_round = false;
     while (!last_round) {
       StageSeconds seconds;
-      seconds.geometry = timed([&] { last_round = fill_streams(); });
+      seconds.geometry = seconds_of([&] { last_round = fill_streams(); });
       if (count_) count_streams(counters);
-      seconds.raster = timed([&] { draw_tiles(first_round, last_round); });
+      seconds.raster = seconds_of([&] { draw_tiles(first_round, last_round); });
       report_.seconds += seconds;
       first_round = false;
     }
@@ -291,13 +290,6 @@ class FusedTiles final : public Renderer {
     counters.raster_bytes = {
         streams + bytes_of(counters.visible_triangles.value_or(0), sizeof(Triangle)),
         bytes_of(static_cast<std::int64_t>(settings_.pixels()), sizeof(std::uint32_t) + sizeof(float))};
-  }
-
-  template <class Stage>
-  static double timed(Stage stage) {
-    const auto begin = std::chrono::steady_clock::now();
-    stage();
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   }
 
   const Scene& scene_;

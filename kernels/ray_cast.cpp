@@ -9,7 +9,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <numeric>
 #include <vector>
 
@@ -63,14 +62,14 @@ class RayCast final : public Renderer {
         depths_(settings_.pixels(), "the depth buffer") {}
 
   const FrameReport& draw() override {
-    report_.seconds.geometry = timed([&] {
+    report_.seconds.geometry = seconds_of([&] {
       copy_triangles();
       rays_.build();
     });
     execution_->reset_tally();
-    report_.seconds.raster = timed([&] { trace(); });
+    report_.seconds.raster = seconds_of([&] { trace(); });
     report_.raster_tally.assign(execution_->tally().begin(), execution_->tally().end());
-    report_.seconds.resolve = timed([&] {
+    report_.seconds.resolve = seconds_of([&] {
       const std::int64_t width = settings_.width;
       execution_->uniform_loop(settings_.height, [&](std::int64_t y, int) {
         resolve_row<Keys>(keys_.data() + y * width, settings_.width, scene_, settings_.tie, DepthMap{},
@@ -138,13 +137,6 @@ class RayCast final : public Renderer {
           keys[x] = ray_cast_key(rays_, row.at(x), settings_, slots_.triangles().size());
       }
     });
-  }
-
-  template <class Stage>
-  static double timed(Stage stage) {
-    const auto begin = std::chrono::steady_clock::now();
-    stage();
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   }
 
   const Scene& scene_;

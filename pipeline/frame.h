@@ -7,6 +7,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -94,6 +95,14 @@ struct StageSeconds {
     return *this;
   }
 };
+
+/// Seconds that `stage()` takes.
+template <class Stage>
+double seconds_of(Stage stage) {
+  const auto begin = std::chrono::steady_clock::now();
+  stage();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
 
 /// What one frame did, besides its picture.
 struct FrameReport {

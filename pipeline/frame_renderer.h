@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <chrono>
 #include <cstring>
 
 #include "pipeline/counted_mode.h"
@@ -137,18 +136,18 @@ class FrameRenderer final : public Renderer {
     const int width = settings_.width;
     Visibility<Mode> visibility{keys_.span(), width};
 
-    report_.seconds.clear = timed([&] {
+    report_.seconds.clear = seconds_of([&] {
       execution_->uniform_loop(settings_.height, [&](std::int64_t y, int) {
         std::fill_n(visibility.row(y), width, Mode::kClear);
       });
     });
-    report_.seconds.geometry = timed([&] {
+    report_.seconds.geometry = seconds_of([&] {
       screen_.transform(scene_.model.triangles, make_screen_transform(camera_, Mode::kDepthFunction),
                         settings_.geometry, *execution_);
     });
     if (permutation_seed_ != 0) screen_.shuffle(permutation_seed_);
     execution_->reset_tally();
-    report_.seconds.raster = timed([&] {
+    report_.seconds.raster = seconds_of([&] {
       if constexpr (CountingMode<Mode>) {
         CountingExecution counting(*execution_);
         strategy_.draw(staged(), visibility, counting);
@@ -160,7 +159,7 @@ class FrameRenderer final : public Renderer {
     report_.raster_tally.assign(execution_->tally().begin(), execution_->tally().end());
     // Without vectors there are no stores past the caches: a block of its own would be one more copy.
     const bool streaming = settings_.techniques.streaming && settings_.geometry.isa != Isa::kBaseline;
-    report_.seconds.resolve = timed([&] {
+    report_.seconds.resolve = seconds_of([&] {
       execution_->uniform_loop(settings_.height, [&](std::int64_t y, int) {
         resolve_row<Mode>(visibility.row(y), width, scene_, settings_.tie, depth_map_, settings_.geometry.isa,
                           colours_.data() + y * width, depths_.data() + y * width, streaming);
@@ -233,13 +232,6 @@ class FrameRenderer final : public Renderer {
                               bytes_of(pixels, sizeof(std::uint32_t) + sizeof(float))};
     if constexpr (requires { strategy_.count(counters); }) strategy_.count(counters);
     return counters;
-  }
-
-  template <class Stage>
-  static double timed(Stage stage) {
-    const auto begin = std::chrono::steady_clock::now();
-    stage();
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   }
 
   const Scene& scene_;

@@ -1,8 +1,7 @@
 // Pictures by ray casting: the reference, and the specification of the kernel ray_cast.
-#include <chrono>
-
 #include "base/buffer.h"
 #include "base/error.h"
+#include "pipeline/frame.h"
 #include "pipeline/resolve.h"
 #include "reference/bands.h"
 #include "reference/embree.h"
@@ -10,15 +9,6 @@
 #include "reference/ray_scene.h"
 
 namespace rasterbench {
-namespace {
-
-double seconds_of(FunctionRef<void()> work) {
-  const auto begin = std::chrono::steady_clock::now();
-  work();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-}
-
-}  // namespace
 
 RayCastPicture ray_cast(std::span<const Triangle> triangles, const Camera& camera, bool robust, int threads) {
   const int width = camera.viewport.width, height = camera.viewport.height;
