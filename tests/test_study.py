@@ -146,7 +146,7 @@ def test_counters_are_those_of_the_specification(study: Study) -> None:
     counted = [r for r in study.records if r["status"] == "ok"]
     for r in counted:
         work, c = r["work"], r["work"]["counted"]
-        if r["config"]["kernel"] in ("ray_cast", "fused_tiles"):  # no array of screen triangles
+        if r["config"]["kernel"] == "ray_cast":  # no screen triangles
             assert c["sizes"] is None and c["fragments_tested"] is None
             continue
         assert sum(c["sizes"].values()) == work["pieces"]
