@@ -14,9 +14,10 @@
 // AVX2).
 //
 // Memory: the streams take 12 bytes for each fragment of a tiny triangle and 40 bytes for each tile that
-// another triangle's box touches, in blocks that each worker keeps between frames. Where a scene would fill
-// more than the budget of the streams (RendererSetup), the frame is drawn in rounds: front end until it is
-// full, tiles, and so on, with 8 bytes a pixel for what was drawn so far.
+// another triangle's box touches, in blocks of 48 entries, of each worker and tile the last one partly empty;
+// they are kept between frames. Where a scene would fill more than the budget of the streams (RendererSetup),
+// the frame is drawn in rounds: front end until it is full, tiles, and so on, with 8 bytes a pixel for what
+// was drawn so far. A budget that is too small for one batch of triangles is exceeded by it.
 #include <fmt/format.h>
 
 #include <atomic>
@@ -122,10 +123,12 @@ class FusedTiles final : public Renderer {
   }
 
   std::size_t bytes() const override {
-    std::size_t sum = colours_.bytes() + depths_.bytes() + kept_depths_.bytes() + kept_ranks_.bytes();
+    std::size_t sum = colours_.bytes() + depths_.bytes() + ids_.bytes() + kept_depths_.bytes() +
+                      kept_ranks_.bytes() + batches_.size() * sizeof(batches_[0]) +
+                      order_.size() * sizeof(order_[0]);
     for (const auto& worker : workers_)
-      sum += sizeof(Worker) + worker->front_end.bytes() + worker->scratch.depths.bytes() +
-             worker->scratch.ranks.bytes();
+      sum += sizeof(Worker) + worker->front_end.bytes() + worker->scratch.bytes() +
+             worker->extra.capacity() * sizeof(worker->extra[0]);
     return sum;
   }
 
@@ -224,18 +227,26 @@ class FusedTiles final : public Renderer {
   /// Makes room for the workers that ran out of it; false where that would exceed the budget and there is
   /// something to draw first.
   bool grow_streams() {
-    std::size_t bytes = 0;
     bool empty = true;
+    for (const auto& worker : workers_) empty = empty && worker->front_end.empty();
+    const bool generous = bytes_grown(true) <= stream_budget_;
+    // A batch that fits into no budget is given its room: it has to be drawn.
+    const bool may_grow = generous || empty || bytes_grown(false) <= stream_budget_;
     for (const auto& worker : workers_) {
-      bytes += worker->front_end.bytes();
-      empty = empty && worker->front_end.empty();
-    }
-    const bool may_grow = empty || bytes < stream_budget_;
-    for (const auto& worker : workers_) {
-      if (may_grow && worker->is_full) worker->front_end.grow();
+      if (may_grow && worker->is_full) worker->front_end.grow(generous);
       worker->is_full = false;
     }
     return may_grow;
+  }
+
+  /// Bytes of all streams once the workers that ran out of room have more.
+  std::size_t bytes_grown(bool generous) const {
+    std::size_t bytes = 0;
+    for (const auto& worker : workers_) {
+      bytes += worker->front_end.bytes();
+      if (worker->is_full) bytes += worker->front_end.bytes_to_grow(generous);
+    }
+    return bytes;
   }
 
   void draw_tiles(bool first_round, bool last_round) {

@@ -10,7 +10,6 @@
 #include <hwy/highway.h>
 
 #include <cstdint>
-#include <limits>
 
 #include "kernels/fixed_lanes-inl.h"
 #include "kernels/tile_lanes.h"
@@ -112,8 +111,10 @@ class FixedSmall {
   HWY_INLINE FixedSmall(const LaneCorner (&corners)[3], const LaneBox& box, IntegerMask lanes, FillRule fill)
       : plane(depth_plane(corners)), edges_(small_edges(corners, box.x0, box.y0, fill)) {
     draws = hn::And(lanes, edges_.draws);
-    edges_.value[0] =
-        hn::IfThenElse(draws, edges_.value[0], integer(std::numeric_limits<std::int32_t>::min() / 2));
+    // Other lanes hold whatever follows a stream's last entry: outside of an edge that stays where it is.
+    edges_.value[0] = hn::IfThenElse(draws, edges_.value[0], integer(-1));
+    edges_.per_row[0] = hn::IfThenElseZero(draws, edges_.per_row[0]);
+    edges_.per_column[0] = hn::IfThenElseZero(draws, edges_.per_column[0]);
   }
 
   HWY_INLINE void start_row() {

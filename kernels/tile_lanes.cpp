@@ -146,7 +146,7 @@ void select(const ScreenBatch<float>& in, const TileSettings& settings, FrontEnd
   FrontEnd::Survivors& out = front_end.survivors;
   const TileGrid& grid = settings.grid;
   std::size_t size = 0;
-  Integer tiles = hn::Zero(kIntegers);
+  std::int64_t tiles = 0;
   const bool first_wins = settings.tie == TieRule::kFirst;
   const auto last_id = integer(static_cast<std::int32_t>(settings.triangle_count - 1));
   for (std::size_t first = 0; first < ScreenBatch<float>::kSize; first += kLanes) {
@@ -167,7 +167,8 @@ void select(const ScreenBatch<float>& in, const TileSettings& settings, FrontEnd
     const LaneTiles corner(box, grid.shift);
     const Integer touched = hn::Mul(hn::Add(hn::Sub(corner.x1, corner.x0), integer(1)),
                                     hn::Add(hn::Sub(corner.y1, corner.y0), integer(1)));
-    tiles = hn::Add(tiles, hn::IfThenElseZero(draws, touched));
+    // At most 2^26 in a lane.
+    tiles += hn::GetLane(hn::SumOfLanes(kIntegers, hn::IfThenElseZero(draws, touched)));
     for (int i = 0; i < 3; ++i) {
       store(px[i], draws, out.x[i] + size);
       store(py[i], draws, out.y[i] + size);
@@ -176,11 +177,8 @@ void select(const ScreenBatch<float>& in, const TileSettings& settings, FrontEnd
     store(first_wins ? ids : hn::Sub(last_id, ids), draws, out.ranks + size);
     size += hn::CountTrue(kIntegers, draws);
   }
-  alignas(64) std::int32_t sums[kLanes];
-  hn::Store(tiles, kIntegers, sums);
   out.size = static_cast<std::int64_t>(size);
-  out.tiles = 0;
-  for (const std::int32_t sum : sums) out.tiles += sum;
+  out.tiles = tiles;
 }
 
 /// The samples of a vector of tiny triangles: boxes of at most 2 x 2 pixels, each within one tile.

@@ -2,6 +2,7 @@
 // streams of a tile to its pixels. Modes fixed_8 and filtered, with the bits of their scalar specifications.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <string_view>
@@ -58,7 +59,7 @@ struct TileSettings {
 /// What the front end of one worker fills, and what it uses meanwhile.
 struct FrontEnd {
   FragmentStreams fragments;
-  TriangleStreams small_triangles;  ///< of boxes of at most 4 x 4 pixels, each within one tile
+  TriangleStreams small_triangles;  ///< of boxes of at most 4 x 4 pixels
   TriangleStreams triangles;        ///< all others
 
   /// Triangles of a batch whose boxes hold a sample of the image.
@@ -75,22 +76,39 @@ struct FrontEnd {
     small_triangles.reset(tiles);
     triangles.reset(tiles);
   }
-  /// Whether the survivors fit for certain: a store of fragments, of which a vector of triangles makes four
-  /// a tile, takes at most one block, and so does a triangle in each tile.
+  /// Whether the survivors fit for certain.
   bool has_room() const {
-    return fragments.spare_blocks() >= 4 * survivors.size &&
-           small_triangles.spare_blocks() >= survivors.size && triangles.spare_blocks() >= survivors.tiles;
+    return fragments.spare_blocks() >= fragments.most_blocks(most_fragments()) &&
+           small_triangles.spare_blocks() >= small_triangles.most_blocks(most_small()) &&
+           triangles.spare_blocks() >= triangles.most_blocks(survivors.tiles);
   }
-  /// Makes room for the survivors, and for as much again as was used, so that a first frame grows few times.
-  void grow() {
-    fragments.grow(4 * survivors.size + fragments.used_blocks());
-    small_triangles.grow(survivors.size + small_triangles.used_blocks());
-    triangles.grow(survivors.tiles + triangles.used_blocks());
+  /// Makes room for the survivors; if `generous`, for as much again as was used, so that a first frame grows
+  /// few times. Throws InputError where the memory is not there.
+  void grow(bool generous) {
+    fragments.grow(wanted(fragments, most_fragments(), generous));
+    small_triangles.grow(wanted(small_triangles, most_small(), generous));
+    triangles.grow(wanted(triangles, survivors.tiles, generous));
+  }
+  /// Bytes that grow() would add.
+  std::size_t bytes_to_grow(bool generous) const {
+    return fragments.bytes_to_grow(wanted(fragments, most_fragments(), generous)) +
+           small_triangles.bytes_to_grow(wanted(small_triangles, most_small(), generous)) +
+           triangles.bytes_to_grow(wanted(triangles, survivors.tiles, generous));
   }
   bool empty() const {
     return fragments.used_blocks() + small_triangles.used_blocks() + triangles.used_blocks() == 0;
   }
   std::size_t bytes() const { return fragments.bytes() + small_triangles.bytes() + triangles.bytes(); }
+
+ private:
+  /// Entries that the survivors may become: boxes of 2 x 2 samples, and of 4 x 4, which touch four tiles.
+  std::int64_t most_fragments() const { return 4 * survivors.size; }
+  std::int64_t most_small() const { return std::min(4 * survivors.size, survivors.tiles); }
+
+  template <class Streams>
+  static std::int64_t wanted(const Streams& streams, std::int64_t entries, bool generous) {
+    return streams.most_blocks(entries) + (generous ? streams.used_blocks() : 0);
+  }
 };
 
 /// Triangles of a tile, set up: x and y count from the tile's first pixel. Each row is one quantity.
@@ -100,8 +118,8 @@ struct TileTriangles {
 
   /// In mode fixed_8: edge e at pixel (x, y): value + per_column x + per_row y >= 0 inside.
   alignas(64) std::int32_t value[3][kRoom], per_column[3][kRoom], per_row[3][kRoom];
-  /// In mode filtered instead: sorted corners in pixels, the bound of FilteredSetup, 1 where the orientation
-  /// is negative.
+  /// In mode filtered instead: sorted corners in pixels, the bound of its edges' errors, 1 where the
+  /// orientation is negative.
   alignas(64) float x[3][kRoom], y[3][kRoom], error[kRoom];
   alignas(64) std::int32_t is_negative[kRoom];
   alignas(64) std::int32_t partial[kRoom];  ///< bit e: edge e may leave samples of the box outside
@@ -115,14 +133,22 @@ struct TileTriangles {
 /// What the drawing of a tile needs; one for each worker.
 struct TileScratch {
   explicit TileScratch(const TileGrid& grid)
-      : depths(static_cast<std::size_t>(grid.rows_in_memory()) * static_cast<std::size_t>(grid.pitch()),
+      : depths(static_cast<std::size_t>(grid.rows_in_memory() + 1) * static_cast<std::size_t>(grid.pitch()),
                "a tile"),
         ranks(depths.size(), "a tile"),
         heads(depths.size(), "a tile"),
         ids(depths.size(), "a tile"),
-        colours(depths.size(), "a tile") {}
+        colours(depths.size(), "a tile") {
+    order.reserve(TileTriangles::kRoom);
+  }
 
-  Buffer<float> depths;        ///< rows_in_memory x pitch; -inf where no pixel of the image is
+  std::size_t bytes() const {
+    return depths.bytes() + ranks.bytes() + heads.bytes() + ids.bytes() + colours.bytes() +
+           order.capacity() * sizeof(order[0]);
+  }
+
+  Buffer<float>
+      depths;  ///< a row that is never drawn, then rows_in_memory; -inf where no pixel of the image is
   Buffer<std::int32_t> ranks;  ///< kNoRank: nothing there yet
   TileTriangles triangles;
   Isa isa = Isa::kBaseline;

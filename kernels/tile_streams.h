@@ -58,6 +58,18 @@ class TileStreams {
   /// Blocks that room() can still take.
   std::int64_t spare_blocks() const { return capacity_ - used_; }
 
+  /// Blocks that `entries` more, appended up to kOverhang at once, can take at most: a tile's first one, and
+  /// another one where that is left with fewer than kOverhang free.
+  std::int64_t most_blocks(std::int64_t entries) const {
+    return std::min(entries, static_cast<std::int64_t>(last_.size()) + entries / (kCapacity - kOverhang + 1));
+  }
+  /// Bytes that grow(blocks) would add.
+  std::size_t bytes_to_grow(std::int64_t blocks) const {
+    return spare_blocks() >= blocks
+               ? 0
+               : static_cast<std::size_t>(std::max(blocks - spare_blocks(), kChunk)) * sizeof(Block);
+  }
+
   /// Makes at least `blocks` spare. Throws InputError where the memory is not there.
   void grow(std::int64_t blocks) {
     while (spare_blocks() < blocks) {
