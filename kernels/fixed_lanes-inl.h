@@ -1,6 +1,6 @@
-// What the vectorised loops of mode fixed_8 share: snapping, set-up of small triangles, depth, keys. Compiled
-// once for each instruction set: to be included after hwy/highway.h by a file that hwy/foreach_target.h
-// includes again and again.
+// What vectorised loops over triangles share: snapping and edges of mode fixed_8, and corners, depth planes
+// and keys, which those of mode filtered use too. Compiled once for each instruction set: to be included
+// after hwy/highway.h by a file that hwy/foreach_target.h includes again and again.
 #if defined(RASTERBENCH_KERNELS_FIXED_LANES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef RASTERBENCH_KERNELS_FIXED_LANES_INL_H_
 #undef RASTERBENCH_KERNELS_FIXED_LANES_INL_H_
