@@ -71,8 +71,9 @@ def test_a_peer_has_a_point_for_each_number_of_threads(beside: Path) -> None:
         assert r["status"] == "ok" and len(r["samples_ms"]) == 6
         threads = r["config"]["threads"]
         assert r["name"] == f"teapot:triangles=3000/160x120/llvmpipe/llvmpipe/top-left/clip/llvmpipe/{threads}"
-        assert {k: r["config"][k] for k in ("numeric", "fill", "backend", "schedule", "chunk", "isa")} == {
-            "numeric": "llvmpipe", "fill": "top-left", "backend": "llvmpipe", "schedule": None, "chunk": None, "isa": "jit"}
+        assert {k: r["config"][k] for k in ("numeric", "fill", "backend", "schedule", "chunk", "isa", "techniques")} == {
+            "numeric": "llvmpipe", "fill": "top-left", "backend": "llvmpipe", "schedule": None, "chunk": None, "isa": "jit",
+            "techniques": None}
         assert r["threads_observed"] == threads and r["per_thread"] == []
 
 

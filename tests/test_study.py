@@ -80,7 +80,7 @@ NUMBER, TEXT, LIST, WHOLE = (int, float), str, list, int
 NULL = type(None)
 CONFIG = {"scene": TEXT, "scene_hash": TEXT, "size": LIST, "kernel": TEXT, "numeric": TEXT, "fill": TEXT, "near": TEXT, "backend": TEXT,
           "schedule": (TEXT, NULL), "chunk": (WHOLE, NULL), "threads": WHOLE, "binding": TEXT, "wait_policy": TEXT, "runtime": TEXT,
-          "tile": (WHOLE, NULL), "isa": TEXT, "output": TEXT, "cache": TEXT, "generality": TEXT, "techniques": TEXT}
+          "tile": (WHOLE, NULL), "isa": TEXT, "output": TEXT, "cache": TEXT, "generality": TEXT, "techniques": (TEXT, NULL)}
 RECORD = {"schema": WHOLE, "id": TEXT, "name": TEXT, "config": dict, "status": TEXT, "launches": LIST, "blocks": LIST, "frames_per_sample": WHOLE,
           "samples_ms": LIST, "stages_ms": dict, "median_ms": (*NUMBER, NULL), "interval_ms": (LIST, NULL), "p95_ms": (*NUMBER, NULL),
           "min_ms": (*NUMBER, NULL), "max_ms": (*NUMBER, NULL), "floor_ms": (*NUMBER, NULL), "stop": (TEXT, NULL), "verify": (dict, NULL), "work": (dict, NULL), "hardware": (dict, NULL),
@@ -176,6 +176,7 @@ def test_config_values(study: Study) -> None:
         c = r["config"]
         assert c["fill"] in ("closed", "top-left") and c["near"] in ("clip", "off") and c["cache"] in ("warm", "cold")
         assert c["output"] == "rgba8+f32" and len(c["size"]) == 2 and all(isinstance(side, int) for side in c["size"])
+        assert c["techniques"] is not None  # peers have none, and none runs here
         assert (c["schedule"] is None) == (c["backend"] == "serial") and (c["tile"] is None) == (c["kernel"] not in ("tile_parallel", "tile_simd", "fused_tiles"))
         schedule = c["backend"] + (f":{c['schedule']}" if c["schedule"] else "") + (f",{c['chunk']}" if c["chunk"] else "")
         parts = [c["scene"], f"{c['size'][0]}x{c['size'][1]}", c["kernel"], c["numeric"], c["fill"], c["near"], schedule, str(c["threads"])]
