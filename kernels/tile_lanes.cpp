@@ -23,6 +23,7 @@
 #include "kernels/tile_filtered-inl.h"
 #include "kernels/tile_fixed-inl.h"
 #include "kernels/tile_vectors-inl.h"
+#include "pipeline/stream_lanes-inl.h"
 
 #ifndef RASTERBENCH_TILE_LANES_ONCE
 #define RASTERBENCH_TILE_LANES_ONCE
@@ -614,18 +615,6 @@ void draw_triangles(TileScratch& scratch, const TileSettings& settings, TilePixe
   triangles.size = 0;
 }
 
-/// Copies n elements past the caches; `to` need not be aligned.
-template <class T>
-void stream_row(const T* from, std::int32_t n, T* to) {
-  constexpr hn::ScalableTag<T> d;
-  constexpr auto lanes = static_cast<std::int32_t>(hn::MaxLanes(d));
-  std::int32_t i = 0;
-  for (; i < n && (reinterpret_cast<std::uintptr_t>(to + i) % (sizeof(T) * hn::MaxLanes(d))) != 0; ++i)
-    to[i] = from[i];
-  for (; i + lanes <= n; i += lanes) hn::Stream(hn::LoadU(d, from + i), d, to + i);
-  for (; i < n; ++i) to[i] = from[i];
-}
-
 /// Tile -> picture.
 void resolve(const TilePixels& tile, const TileSettings& settings, TileScratch& scratch,
              const TileOutput& output) {
@@ -680,8 +669,8 @@ void resolve(const TilePixels& tile, const TileSettings& settings, TileScratch& 
     }
     const std::int64_t at = std::int64_t{tile.box.y0 + y} * settings.grid.width + tile.box.x0;
     if (settings.techniques.streaming) {
-      stream_row(row_colours, width, output.colours + at);
-      stream_row(row_depths, width, output.depths + at);
+      stream_row(row_colours, static_cast<std::size_t>(width), output.colours + at);
+      stream_row(row_depths, static_cast<std::size_t>(width), output.depths + at);
     } else {
       std::copy_n(row_colours, width, output.colours + at);
       std::copy_n(row_depths, width, output.depths + at);

@@ -17,23 +17,12 @@
 #include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
+#include "pipeline/stream_lanes-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace rasterbench {
 namespace HWY_NAMESPACE {
 namespace {
-
-namespace hn = hwy::HWY_NAMESPACE;
-
-template <class T>
-HWY_INLINE void stream_row(const T* from, std::size_t n, T* to) {
-  constexpr hn::ScalableTag<T> kVector;
-  const std::size_t lanes = hn::Lanes(kVector);
-  const std::size_t beyond = reinterpret_cast<std::uintptr_t>(to) / sizeof(T) % lanes;  // a vector's start
-  std::size_t i = std::min(n, (lanes - beyond) % lanes);
-  std::copy_n(from, i, to);
-  for (; i + lanes <= n; i += lanes) hn::Stream(hn::LoadU(kVector, from + i), kVector, to + i);
-  std::copy_n(from + i, n - i, to + i);
-}
 
 void stream(const std::uint32_t* colours, const float* depths, std::size_t n, std::uint32_t* to_colours,
             float* to_depths) {
