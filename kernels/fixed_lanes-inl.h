@@ -10,6 +10,9 @@
 
 #include <hwy/highway.h>
 
+#include <cstdint>
+#include <iterator>
+
 #include "numeric/mode.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -31,6 +34,15 @@ using Float = hn::Vec<Floats>;
 using Integer = hn::Vec<Integers>;
 using FloatMask = hn::Mask<Floats>;
 using IntegerMask = hn::Mask<Integers>;
+
+/// first, first + 1, ... Highway 1.0's Iota() builds its vector in memory lane by lane, and waits for it.
+template <class D>
+HWY_INLINE hn::Vec<D> counting_from(D d, hn::TFromD<D> first) {
+  alignas(64) static constexpr hn::TFromD<D> kCounting[] = {0, 1, 2,  3,  4,  5,  6,  7,
+                                                            8, 9, 10, 11, 12, 13, 14, 15};
+  static_assert(hn::MaxLanes(D()) <= std::size(kCounting));
+  return hn::Add(hn::Load(d, kCounting), hn::Set(d, first));
+}
 
 /// encode() of numeric/mode.h.
 template <class D, class V>

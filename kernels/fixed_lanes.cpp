@@ -68,7 +68,7 @@ HWY_INLINE void draw_span(const Fixed8::Prepared& t, std::int32_t y, std::int32_
   for (std::int32_t next = x0; next < x1; next += lanes) {
     const std::int32_t x = std::min(next, x1 - lanes);
     // Pixel numbers are small integers: float32 holds them exactly.
-    const auto sample = hn::Add(hn::Iota(kHalfFloats, static_cast<float>(x)), half);
+    const auto sample = hn::Add(counting_from(kHalfFloats, static_cast<float>(x)), half);
     const auto depth = clamped(hn::Add(at_row, hn::Mul(gx, hn::Sub(sample, corner))), low, high);
     const auto code = hn::PromoteTo(kKeys, encode(kHalfFloats, depth));
     const auto key = hn::Or(hn::ShiftLeft<32>(code), rank);

@@ -128,6 +128,28 @@ class FilteredSmall {
   Float value_of_row_[3], value_[3], per_column_[3], per_row_[3], error_;
 };
 
+/// The first and last samples of boxes.
+struct CornerSamples {
+  Float x0, y0, x1, y1;
+};
+HWY_INLINE CornerSamples corner_samples(const LaneBox& box, const PixelBox& tile) {
+  const Integer left = integer(tile.x0), top = integer(tile.y0), one = integer(1);
+  return {sample_of(hn::Add(box.x0, left)), sample_of(hn::Add(box.y0, top)),
+          sample_of(hn::Add(hn::Sub(box.x1, one), left)), sample_of(hn::Add(hn::Sub(box.y1, one), top))};
+}
+
+/// The smallest and largest values over boxes of an edge function as floats give it. Each of its operations
+/// rounds monotonically: they are those at two corners.
+struct EdgeRange {
+  Float smallest, largest;
+};
+HWY_INLINE EdgeRange range_of_edge(Float dx, Float dy, Float from_x, Float from_y, const CornerSamples& at) {
+  const Float of_y0 = hn::Mul(dx, hn::Sub(at.y0, from_y)), of_y1 = hn::Mul(dx, hn::Sub(at.y1, from_y));
+  const Float of_x0 = hn::Mul(dy, hn::Sub(at.x0, from_x)), of_x1 = hn::Mul(dy, hn::Sub(at.x1, from_x));
+  return {hn::Sub(hn::Min(of_y0, of_y1), hn::Max(of_x0, of_x1)),
+          hn::Sub(hn::Max(of_y0, of_y1), hn::Min(of_x0, of_x1))};
+}
+
 /// As FixedTileTriangles.
 class FilteredTileTriangles {
  public:
@@ -136,7 +158,7 @@ class FilteredTileTriangles {
       : corners_(corners), setup_(corners) {
     const LaneBox whole = whole_box<Float>({corners[0].x, corners[1].x, corners[2].x},
                                            {corners[0].y, corners[1].y, corners[2].y});
-    const Integer left = integer(tile.x0), top = integer(tile.y0), one = integer(1);
+    const Integer left = integer(tile.x0), top = integer(tile.y0);
     box = within(
         {hn::Sub(whole.x0, left), hn::Sub(whole.y0, top), hn::Sub(whole.x1, left), hn::Sub(whole.y1, top)},
         tile.x1 - tile.x0, tile.y1 - tile.y0);
@@ -146,10 +168,7 @@ class FilteredTileTriangles {
     // 5 as in FilteredEdges.
     error_ = hn::Add(hn::Mul(setup_.size, hn::Set(kFloats, (5 + 1) * kUnit)), hn::Set(kFloats, kUnderflow));
     error_of_steps_ = hn::Zero(kFloats);
-    x0_ = sample_of(hn::Add(box.x0, left));
-    y0_ = sample_of(hn::Add(box.y0, top));
-    x1_ = sample_of(hn::Add(hn::Sub(box.x1, one), left));
-    y1_ = sample_of(hn::Add(hn::Sub(box.y1, one), top));
+    samples_ = corner_samples(box, tile);
   }
 
   /// Each operation of an edge function rounds monotonically: its smallest and largest values over the box
@@ -157,12 +176,7 @@ class FilteredTileTriangles {
   /// before store_edges(), which needs the errors of those that cut.
   HWY_INLINE EdgeCut cut_by(int e) {
     const FloatCorner& from = corners_[kEdgeFrom[e]];
-    const Float of_y0 = hn::Mul(setup_.dx[e], hn::Sub(y0_, from.y)),
-                of_y1 = hn::Mul(setup_.dx[e], hn::Sub(y1_, from.y));
-    const Float of_x0 = hn::Mul(setup_.dy[e], hn::Sub(x0_, from.x)),
-                of_x1 = hn::Mul(setup_.dy[e], hn::Sub(x1_, from.x));
-    const Float largest = hn::Sub(hn::Max(of_y0, of_y1), hn::Min(of_x0, of_x1));
-    const Float smallest = hn::Sub(hn::Min(of_y0, of_y1), hn::Max(of_x0, of_x1));
+    const auto [smallest, largest] = range_of_edge(setup_.dx[e], setup_.dy[e], from.x, from.y, samples_);
     const FloatMask misses = hn::Lt(largest, hn::Neg(error_)), cuts = hn::Le(smallest, error_);
     // FilteredCut goes from the first sample of the box through samples of the box, where the edge function
     // is at most m. Along a side of the box it changes by at most 2 m: dx, dy and the product with dy carry a
@@ -193,9 +207,9 @@ class FilteredTileTriangles {
  private:
   const FloatCorner (&corners_)[3];
   FilteredSetup setup_;
-  Float x0_, y0_, x1_, y1_;  // the samples at the corners of the box
-  Float error_;              // of an edge function at one sample
-  Float error_of_steps_;     // what going from sample to sample adds
+  CornerSamples samples_;
+  Float error_;           // of an edge function at one sample
+  Float error_of_steps_;  // what going from sample to sample adds
 };
 
 /// FilteredEdges::inside() of triangle i.
@@ -216,22 +230,35 @@ class ExactTriangle {
   FilteredEdges::Setup edges_;
 };
 
+/// Edge e of triangle i: dx (y - from.y) - dy (x - from.x), positive inside.
+struct FilteredEdge {
+  HWY_INLINE FilteredEdge(const TileTriangles& t, std::size_t i, int e) {
+    const int from = kEdgeFrom[e], to = kEdgeTo[e];
+    const float sign = is_flipped(t.is_negative[i] != 0, e) ? -1.0f : 1.0f;
+    x = t.x[from][i];
+    y = t.y[from][i];
+    dx = sign * (t.x[to][i] - x);
+    dy = sign * (t.y[to][i] - y);
+  }
+
+  float x, y, dx, dy;
+};
+
 /// As FixedCut. What is uncertain counts as outside and is told after the last row, so that the rows have no
 /// way out.
 template <int kEdges>
 class FilteredCut {
  public:
-  HWY_INLINE FilteredCut(const TileTriangles& t, std::size_t i, const int (&cutting)[3], const PixelBox& tile)
-      : first_column_(t.x0[i]), error_(hn::Set(kFloats, t.error[i])) {
-    const float x = static_cast<float>(tile.x0 + t.x0[i]) + 0.5f;
-    const float y = static_cast<float>(tile.y0 + t.y0[i]) + 0.5f;
+  HWY_INLINE FilteredCut(const TileTriangles& t, std::size_t i, const int (&cutting)[3], const PixelBox& box,
+                         const PixelBox& tile)
+      : first_column_(box.x0), error_(hn::Set(kFloats, t.error[i])) {
+    const float x = static_cast<float>(tile.x0 + box.x0) + 0.5f;
+    const float y = static_cast<float>(tile.y0 + box.y0) + 0.5f;
     for (int k = 0; k < kEdges; ++k) {
-      const int e = cutting[k], from = kEdgeFrom[e], to = kEdgeTo[e];
-      const float sign = is_flipped(t.is_negative[i] != 0, e) ? -1.0f : 1.0f;
-      const float dx = sign * (t.x[to][i] - t.x[from][i]), dy = sign * (t.y[to][i] - t.y[from][i]);
-      first_[k] = dx * (y - t.y[from][i]) - dy * (x - t.x[from][i]);
-      per_column_[k] = dy;
-      per_row_[k] = hn::Set(kFloats, dx);
+      const FilteredEdge edge(t, i, cutting[k]);
+      first_[k] = edge.dx * (y - edge.y) - edge.dy * (x - edge.x);
+      per_column_[k] = edge.dy;
+      per_row_[k] = hn::Set(kFloats, edge.dx);
     }
   }
 
@@ -275,6 +302,16 @@ struct FilteredArithmetic {
   using Cut = FilteredCut<kEdges>;
 
   static HWY_INLINE Float coordinate(Float pixels) { return pixels; }
+  static HWY_INLINE EdgeCut cut_by(const TileTriangles& t, std::size_t i, int e, const LaneBox& parts,
+                                   const PixelBox& tile) {
+    const FilteredEdge edge(t, i, e);
+    const auto set = [](float v) HWY_ATTR { return hn::Set(kFloats, v); };
+    const auto [smallest, largest] =
+        range_of_edge(set(edge.dx), set(edge.dy), set(edge.x), set(edge.y), corner_samples(parts, tile));
+    const Float error = set(t.error[i]);
+    return {hn::RebindMask(kIntegers, hn::Lt(largest, hn::Neg(error))),
+            hn::RebindMask(kIntegers, hn::Le(smallest, error))};
+  }
 };
 
 }  // namespace

@@ -138,6 +138,17 @@ class FixedSmall {
   Integer value_[3];
 };
 
+/// What an edge does to the samples of boxes.
+HWY_INLINE EdgeCut cut(Integer value, Integer per_column, Integer per_row, const LaneBox& box) {
+  const Integer zero = hn::Zero(kIntegers), one = integer(1);
+  const Integer last_x = hn::Sub(box.x1, one), last_y = hn::Sub(box.y1, one);
+  const Integer at_x0 = hn::Mul(per_column, box.x0), at_x1 = hn::Mul(per_column, last_x);
+  const Integer at_y0 = hn::Mul(per_row, box.y0), at_y1 = hn::Mul(per_row, last_y);
+  const Integer largest = hn::Add(value, hn::Add(hn::Max(at_x0, at_x1), hn::Max(at_y0, at_y1)));
+  const Integer smallest = hn::Add(value, hn::Add(hn::Min(at_x0, at_x1), hn::Min(at_y0, at_y1)));
+  return {hn::Lt(largest, zero), hn::Lt(smallest, zero)};
+}
+
 /// A vector of triangles of any size, set up for a tile.
 class FixedTileTriangles {
  public:
@@ -161,14 +172,7 @@ class FixedTileTriangles {
 
   /// Whether edge e leaves samples of the box outside: all of them, or some.
   HWY_INLINE EdgeCut cut_by(int e) const {
-    const Integer zero = hn::Zero(kIntegers), one = integer(1);
-    const Integer last_x = hn::Sub(box.x1, one), last_y = hn::Sub(box.y1, one);
-    const Integer at_x0 = hn::Mul(setup_.per_column[e], box.x0),
-                  at_x1 = hn::Mul(setup_.per_column[e], last_x);
-    const Integer at_y0 = hn::Mul(setup_.per_row[e], box.y0), at_y1 = hn::Mul(setup_.per_row[e], last_y);
-    const Integer largest = hn::Add(setup_.value[e], hn::Add(hn::Max(at_x0, at_x1), hn::Max(at_y0, at_y1)));
-    const Integer smallest = hn::Add(setup_.value[e], hn::Add(hn::Min(at_x0, at_x1), hn::Min(at_y0, at_y1)));
-    return {hn::Lt(largest, zero), hn::Lt(smallest, zero)};
+    return cut(setup_.value[e], setup_.per_column[e], setup_.per_row[e], box);
   }
 
   HWY_INLINE void store_edges(IntegerMask lanes, TileTriangles& out) const {
@@ -202,7 +206,8 @@ class FixedTileTriangles {
 template <int kEdges>
 class FixedCut {
  public:
-  HWY_INLINE FixedCut(const TileTriangles& t, std::size_t i, const int (&cutting)[3], const PixelBox&)
+  HWY_INLINE FixedCut(const TileTriangles& t, std::size_t i, const int (&cutting)[3], const PixelBox&,
+                      const PixelBox&)
       : t_(t), i_(i), cutting_(cutting) {}
 
   /// `columns` and rows from y0 on count from the tile's first pixel.
@@ -241,6 +246,11 @@ struct FixedArithmetic {
   using Cut = FixedCut<kEdges>;
 
   static HWY_INLINE Integer coordinate(Float pixels) { return snapped(pixels); }
+  /// What edge e of triangle i does to parts of its box.
+  static HWY_INLINE EdgeCut cut_by(const TileTriangles& t, std::size_t i, int e, const LaneBox& parts,
+                                   const PixelBox&) {
+    return cut(integer(t.value[e][i]), integer(t.per_column[e][i]), integer(t.per_row[e][i]), parts);
+  }
 };
 
 }  // namespace

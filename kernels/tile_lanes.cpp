@@ -33,12 +33,16 @@ namespace {
 /// The depth of an empty pixel: with kNoRank it is the mode's kClear, so that d = 1 is not drawn.
 constexpr float kClearDepth = 0x1.fffffep-1f;
 
+constexpr int kBlockShift = 4, kBlockSide = 1 << kBlockShift;
+
 /// A tile's pixels while it is drawn.
 struct TilePixels {
   float* depths;
   std::int32_t* ranks;
   std::int64_t pitch;
-  PixelBox box;  ///< of the image
+  PixelBox box;     ///< of the image
+  int block_shift;  ///< log2 of the blocks in a row
+  std::int32_t blocks() const { return 1 << 2 * block_shift; }
 
   std::int32_t width() const { return box.x1 - box.x0; }
   std::int32_t height() const { return box.y1 - box.y0; }
@@ -52,16 +56,6 @@ struct TilePixels {
     ranks[place] = kept ? rank : old_rank;
   }
 };
-
-void clear(TilePixels& tile, int rows) {
-  for (int y = 0; y < rows; ++y) {
-    float* depths = tile.depths + y * tile.pitch;
-    const std::int32_t inside = y < tile.height() ? tile.width() : 0;
-    std::fill_n(depths, inside, kClearDepth);
-    std::fill(depths + inside, depths + tile.pitch, -std::numeric_limits<float>::infinity());
-    std::fill_n(tile.ranks + y * tile.pitch, tile.pitch, kNoRank);
-  }
-}
 
 /// Keeps a tile until the next round, and brings it back.
 void save(const TilePixels& tile, int image_width, float* depths, std::int32_t* ranks) {
@@ -491,18 +485,34 @@ HWY_INLINE void keep(IntegerMask inside, Float depth, Integer rank, float* depth
   store_where(rank, kept, old_rank, kIntegers, ranks);
 }
 
-/// Draws the samples of triangle i that floats leave uncertain, in `columns` of its box. Out of line: it is
-/// rare.
+/// The pixels of the tile in a block.
+PixelBox block_box(const TilePixels& tile, std::int32_t block) {
+  const std::int32_t x = (block & ((1 << tile.block_shift) - 1)) << kBlockShift;
+  const std::int32_t y = block >> tile.block_shift << kBlockShift;
+  return intersect({x, y, x + kBlockSide, y + kBlockSide}, {0, 0, tile.width(), tile.height()});
+}
+
+/// The largest depth in a box that begins where a vector does: what is farther everywhere is hidden.
+float farthest_depth(const TilePixels& tile, const PixelBox& box) {
+  Float most = hn::Set(kFloats, -std::numeric_limits<float>::infinity());
+  for (std::int32_t y = box.y0; y < box.y1; ++y)
+    for (std::int32_t x = box.x0; x < box.x1; x += kWidth)
+      most = hn::Max(most, hn::LoadU(kFloats, tile.depths + y * tile.pitch + x));
+  return hn::GetLane(hn::MaxOfLanes(kFloats, most));
+}
+
+/// Draws the samples of triangle i that floats leave uncertain, in the columns of `box` from x on. Out of
+/// line: it is rare.
 template <class Arithmetic, int kEdges>
 HWY_NOINLINE void draw_uncertain(const TileTriangles& t, std::size_t i, const int (&cutting)[3],
-                                 FillRule fill, std::int32_t x, TilePixels tile) {
-  const Integer columns = hn::Iota(kIntegers, x);
-  const IntegerMask in_box = hn::Lt(columns, integer(t.x1[i]));
+                                 const PixelBox& box, FillRule fill, std::int32_t x, TilePixels tile) {
+  const Integer columns = counting_from(kIntegers, x);
+  const IntegerMask in_box = hn::And(hn::Gt(columns, integer(box.x0 - 1)), hn::Lt(columns, integer(box.x1)));
   const ExactTriangle triangle(t, i, fill);
   const DepthPlane<float> plane{t.d0[i], t.gx[i], t.gy[i], t.low[i], t.high[i]};
-  typename Arithmetic::template Cut<kEdges> edges(t, i, cutting, tile.box);
-  edges.start(columns, t.y0[i]);
-  for (std::int32_t y = t.y0[i]; y < t.y1[i]; ++y) {
+  typename Arithmetic::template Cut<kEdges> edges(t, i, cutting, box, tile.box);
+  edges.start(columns, box.y0);
+  for (std::int32_t y = box.y0; y < box.y1; ++y) {
     edges.next_row(in_box);
     for (std::uint32_t left = bits_of(edges.take_uncertain(in_box)); left != 0; left &= left - 1) {
       const std::int32_t column = x + std::countr_zero(left);
@@ -515,34 +525,51 @@ HWY_NOINLINE void draw_uncertain(const TileTriangles& t, std::size_t i, const in
   }
 }
 
-/// Draws triangle i, whose box is cut by the edges `cutting`; the others need no look.
+/// Draws the samples of triangle i in `box`, which the edges `cutting` cut; the others need no look. Begins
+/// at `column`, at or before the box.
 template <class Arithmetic, int kEdges>
-HWY_INLINE void draw_triangle(const TileTriangles& t, std::size_t i, const int (&cutting)[3], FillRule fill,
-                              const TilePixels& tile) {
-  const std::int32_t x1 = t.x1[i], y0 = t.y0[i], y1 = t.y1[i];
+HWY_INLINE void draw_box(const TileTriangles& t, std::size_t i, const int (&cutting)[3], const PixelBox& box,
+                         std::int32_t column, FillRule fill, const TilePixels& tile) {
   const float d0 = t.d0[i], gy = t.gy[i], py = t.py[i];
   const Float gx = hn::Set(kFloats, t.gx[i]), px = hn::Set(kFloats, t.px[i]);
   const Float low = hn::Set(kFloats, t.low[i]), high = hn::Set(kFloats, t.high[i]);
   const Integer rank = integer(t.ranks[i]);
-  const float first_y = static_cast<float>(tile.box.y0 + y0) + 0.5f;
+  const float first_y = static_cast<float>(tile.box.y0 + box.y0) + 0.5f;
   const std::int64_t pitch = tile.pitch;
-  typename Arithmetic::template Cut<kEdges> edges(t, i, cutting, tile.box);
-  for (std::int32_t x = t.x0[i]; x < x1; x += kWidth) {
-    const Integer columns = hn::Iota(kIntegers, x);
-    const IntegerMask in_box = hn::Lt(columns, integer(x1));
-    edges.start(columns, y0);
+  typename Arithmetic::template Cut<kEdges> edges(t, i, cutting, box, tile.box);
+  for (std::int32_t x = column; x < box.x1; x += kWidth) {
+    const Integer columns = counting_from(kIntegers, x);
+    const IntegerMask in_box =
+        hn::And(hn::Gt(columns, integer(box.x0 - 1)), hn::Lt(columns, integer(box.x1)));
+    edges.start(columns, box.y0);
     const Float of_columns = hn::Mul(gx, hn::Sub(sample_of(hn::Add(columns, integer(tile.box.x0))), px));
-    float* depths = tile.depths + y0 * pitch + x;
-    std::int32_t* ranks = tile.ranks + y0 * pitch + x;
+    float* depths = tile.depths + box.y0 * pitch + x;
+    std::int32_t* ranks = tile.ranks + box.y0 * pitch + x;
     float sample_y = first_y;  // small multiples of one half: exact
-    for (std::int32_t rows = y1 - y0; rows > 0; --rows, depths += pitch, ranks += pitch, sample_y += 1.0f) {
+    for (std::int32_t rows = box.y1 - box.y0; rows > 0;
+         --rows, depths += pitch, ranks += pitch, sample_y += 1.0f) {
       const IntegerMask inside = edges.next_row(in_box);
       const float of_row = d0 + gy * (sample_y - py);
       keep(inside, clamped(hn::Add(hn::Set(kFloats, of_row), of_columns), low, high), rank, depths, ranks);
     }
     if constexpr (!Arithmetic::kIsExact && kEdges > 0)
       if (HWY_UNLIKELY(!hn::AllFalse(kIntegers, edges.take_uncertain(in_box))))
-        draw_uncertain<Arithmetic, kEdges>(t, i, cutting, fill, x, tile);
+        draw_uncertain<Arithmetic, kEdges>(t, i, cutting, box, fill, x, tile);
+  }
+}
+
+template <class Arithmetic>
+HWY_INLINE void draw_box(const TileTriangles& t, std::size_t i, const int (&cutting)[3], int edges,
+                         const PixelBox& box, std::int32_t column, FillRule fill, const TilePixels& tile) {
+  switch (edges) {
+    case 0:
+      return draw_box<Arithmetic, 0>(t, i, cutting, box, column, fill, tile);
+    case 1:
+      return draw_box<Arithmetic, 1>(t, i, cutting, box, column, fill, tile);
+    case 2:
+      return draw_box<Arithmetic, 2>(t, i, cutting, box, column, fill, tile);
+    default:
+      return draw_box<Arithmetic, 3>(t, i, cutting, box, column, fill, tile);
   }
 }
 
@@ -551,24 +578,69 @@ void draw_triangle(const TileTriangles& t, std::size_t i, FillRule fill, const T
   int cutting[3] = {}, edges = 0;
   for (int e = 0; e < 3; ++e)
     if (t.partial[i] >> e & 1) cutting[edges++] = e;
-  switch (edges) {
-    case 0:
-      return draw_triangle<Arithmetic, 0>(t, i, cutting, fill, tile);
-    case 1:
-      return draw_triangle<Arithmetic, 1>(t, i, cutting, fill, tile);
-    case 2:
-      return draw_triangle<Arithmetic, 2>(t, i, cutting, fill, tile);
-    default:
-      return draw_triangle<Arithmetic, 3>(t, i, cutting, fill, tile);
-  }
+  draw_box<Arithmetic>(t, i, cutting, edges, {t.x0[i], t.y0[i], t.x1[i], t.y1[i]}, t.x0[i], fill, tile);
 }
 
-/// The largest depth of a tile: what is farther everywhere is hidden.
-float farthest_depth(const TilePixels& tile) {
+/// The column at which the vector of a column begins.
+HWY_INLINE std::int32_t vector_start(std::int32_t column) { return column & ~(kWidth - 1); }
+
+/// Draws a large triangle by the blocks of the tile: those outside of an edge or behind what is there are
+/// left out, and of the others each is cut by few edges. Whether any was hidden and none drawn.
+template <class Arithmetic>
+bool draw_in_blocks(const TileTriangles& t, std::size_t i, FillRule fill, const TilePixels& tile,
+                    float* farthest, bool rejects) {
+  const PixelBox box{t.x0[i], t.y0[i], t.x1[i], t.y1[i]};
+  const LanePlane plane = {hn::Set(kFloats, t.d0[i]),  hn::Set(kFloats, t.gx[i]),   hn::Set(kFloats, t.gy[i]),
+                           hn::Set(kFloats, t.low[i]), hn::Set(kFloats, t.high[i]), hn::Set(kFloats, t.px[i]),
+                           hn::Set(kFloats, t.py[i])};
+  bool drawn = false, hidden = false;
+  const std::int32_t blocks = tile.blocks();
+  for (std::int32_t first = 0; first < blocks; first += kWidth) {
+    const Integer index = counting_from(kIntegers, first);
+    const Integer left = hn::ShiftLeft<kBlockShift>(hn::And(index, integer((1 << tile.block_shift) - 1)));
+    const Integer top = hn::ShiftLeft<kBlockShift>(hn::ShiftRightSame(index, tile.block_shift));
+    const LaneBox part = {hn::Max(left, integer(box.x0)), hn::Max(top, integer(box.y0)),
+                          hn::Min(hn::Add(left, integer(kBlockSide)), integer(box.x1)),
+                          hn::Min(hn::Add(top, integer(kBlockSide)), integer(box.y1))};
+    IntegerMask todo = hn::And(part.holds_a_sample(), hn::Lt(index, integer(blocks)));
+    if (hn::AllFalse(kIntegers, todo)) continue;
+    std::uint32_t cuts[3] = {};
+    for (int e = 0; e < 3; ++e) {
+      if ((t.partial[i] >> e & 1) == 0) continue;
+      const EdgeCut edge = Arithmetic::cut_by(t, i, e, part, tile.box);
+      todo = hn::AndNot(edge.misses, todo);
+      cuts[e] = bits_of(edge.cuts);
+    }
+    if (rejects) {
+      const Integer last_x = hn::Sub(part.x1, integer(1)), last_y = hn::Sub(part.y1, integer(1));
+      const Integer near_x = hn::Add(t.gx[i] > 0 ? part.x0 : last_x, integer(tile.box.x0));
+      const Integer near_y = hn::Add(t.gy[i] > 0 ? part.y0 : last_y, integer(tile.box.y0));
+      const Float nearest = depth_at(plane, depth_of_row(plane, sample_of(near_y)), sample_of(near_x));
+      const IntegerMask behind =
+          hn::RebindMask(kIntegers, hn::Gt(nearest, hn::LoadU(kFloats, farthest + first)));
+      hidden = hidden || !hn::AllFalse(kIntegers, hn::And(todo, behind));
+      todo = hn::AndNot(behind, todo);
+    }
+    for (std::uint32_t bits = bits_of(todo); bits != 0; bits &= bits - 1) {
+      const std::int32_t lane = std::countr_zero(bits), block = first + lane;
+      const PixelBox whole = block_box(tile, block), here = intersect(box, whole);
+      int cutting[3] = {}, edges = 0;
+      for (int e = 0; e < 3; ++e) {
+        cutting[edges] = e;
+        edges += cuts[e] >> lane & 1;
+      }
+      draw_box<Arithmetic>(t, i, cutting, edges, here, vector_start(here.x0), fill, tile);
+      if (rejects) farthest[block] = farthest_depth(tile, whole);
+      drawn = true;
+    }
+  }
+  return hidden && !drawn;
+}
+
+/// The largest of n floats, with as many behind them as a vector has.
+HWY_INLINE float largest(const float* values, std::int32_t n) {
   Float most = hn::Set(kFloats, -std::numeric_limits<float>::infinity());
-  for (std::int32_t y = 0; y < tile.height(); ++y)
-    for (std::int32_t x = 0; x < tile.width(); x += kWidth)
-      most = hn::Max(most, hn::LoadU(kFloats, tile.depths + y * tile.pitch + x));
+  for (std::int32_t i = 0; i < n; i += kWidth) most = hn::Max(most, hn::LoadU(kFloats, values + i));
   return hn::GetLane(hn::MaxOfLanes(kFloats, most));
 }
 
@@ -577,13 +649,7 @@ template <class Arithmetic>
 void draw_triangles(TileScratch& scratch, const TileSettings& settings, TilePixels& tile) {
   TileTriangles& triangles = scratch.triangles;
   std::vector<std::uint64_t>& order = scratch.order;
-  if (!settings.techniques.front_to_back) {
-    for (std::size_t i = 0; i < triangles.size; ++i)
-      draw_triangle<Arithmetic>(triangles, i, settings.fill, tile);
-    triangles.size = 0;
-    return;
-  }
-  const std::int64_t area = std::int64_t{tile.width()} * tile.height();
+  const bool rejects = settings.techniques.front_to_back;
   const auto box_area = [&](std::size_t i) {
     return (triangles.x1[i] - triangles.x0[i]) * (triangles.y1[i] - triangles.y0[i]);
   };
@@ -593,25 +659,44 @@ void draw_triangles(TileScratch& scratch, const TileSettings& settings, TilePixe
   for (std::size_t i = 0; i < triangles.size; ++i)
     if (box_area(i) >= kLarge)
       order.push_back(std::uint64_t{rasterbench::encode(triangles.nearest[i])} << 32 | i);
-  std::sort(order.begin(), order.end());
-  // What was drawn since then has at most lowered it. A look at every pixel is worth it once as many were
-  // drawn.
-  float farthest = std::numeric_limits<float>::infinity();
+  if (rejects) std::sort(order.begin(), order.end());
+  float* const farthest = scratch.farthest;
+  for (auto entry = order.begin(); entry != order.end(); ++entry) {
+    const auto i = static_cast<std::uint32_t>(*entry);
+    if (rejects && triangles.nearest[i] > largest(farthest, tile.blocks())) {
+      scratch.hidden_entries += order.end() - entry;
+      break;
+    }
+    scratch.hidden_entries +=
+        draw_in_blocks<Arithmetic>(triangles, i, settings.fill, tile, farthest, rejects);
+  }
+  const std::int64_t area = std::int64_t{tile.width()} * tile.height();
   std::int64_t drawn = 0;
-  const auto draw = [&](std::size_t i) {
-    if (triangles.nearest[i] > farthest) {
+  const auto is_hidden = [&](std::size_t i) {
+    const auto at = [&](std::int32_t x, std::int32_t y) {
+      return farthest[(y >> kBlockShift << tile.block_shift) + (x >> kBlockShift)];
+    };
+    const std::int32_t x0 = triangles.x0[i], x1 = triangles.x1[i] - 1, y0 = triangles.y0[i],
+                       y1 = triangles.y1[i] - 1;
+    if (std::max((x1 >> kBlockShift) - (x0 >> kBlockShift), (y1 >> kBlockShift) - (y0 >> kBlockShift)) > 1)
+      return false;
+    return triangles.nearest[i] >
+           std::max(std::max(at(x0, y0), at(x1, y0)), std::max(at(x0, y1), at(x1, y1)));
+  };
+  for (std::size_t i = 0; i < triangles.size; ++i) {
+    if (box_area(i) >= kLarge) continue;
+    if (rejects && is_hidden(i)) {
       ++scratch.hidden_entries;
-      return;
+      continue;
     }
     draw_triangle<Arithmetic>(triangles, i, settings.fill, tile);
     drawn += box_area(i);
-    if (drawn < area) return;
-    farthest = farthest_depth(tile);
+    // A look at every pixel is worth it once as many were drawn.
+    if (drawn < area || !rejects) continue;
+    for (std::int32_t block = 0; block < tile.blocks(); ++block)
+      farthest[block] = farthest_depth(tile, block_box(tile, block));
     drawn = 0;
-  };
-  for (const std::uint64_t entry : order) draw(static_cast<std::uint32_t>(entry));
-  for (std::size_t i = 0; i < triangles.size; ++i)
-    if (box_area(i) < kLarge) draw(i);
+  }
   triangles.size = 0;
 }
 
@@ -684,13 +769,32 @@ void resolve(const TilePixels& tile, const TileSettings& settings, TileScratch& 
   }
 }
 
+void clear(const TilePixels& tile, int rows) {
+  const Float empty = hn::Set(kFloats, kClearDepth);
+  const Float beyond = hn::Set(kFloats, -std::numeric_limits<float>::infinity());
+  const Integer no_rank = integer(kNoRank);
+  for (std::int32_t y = 0; y < rows; ++y) {
+    const Integer inside = integer(y < tile.height() ? tile.width() : 0);
+    float* const depths = tile.depths + y * tile.pitch;
+    std::int32_t* const ranks = tile.ranks + y * tile.pitch;
+    for (std::int32_t x = 0; x < tile.pitch; x += kWidth) {
+      const IntegerMask in_image = hn::Lt(counting_from(kIntegers, x), inside);
+      hn::StoreU(hn::IfThenElse(hn::RebindMask(kFloats, in_image), empty, beyond), kFloats, depths + x);
+      hn::StoreU(no_rank, kIntegers, ranks + x);
+    }
+  }
+}
+
 template <class Arithmetic>
 void draw(const TileTask& task, const TileSettings& settings, TileScratch& scratch,
           const TileOutput& output) {
   // A row's left neighbours are looked at too: the first row has room before it.
   const std::int64_t pitch = settings.grid.pitch();
   TilePixels tile{scratch.depths.data() + pitch, scratch.ranks.data() + pitch, pitch,
-                  settings.grid.box(task.tile)};
+                  settings.grid.box(task.tile), std::max(settings.grid.shift - kBlockShift, 0)};
+  std::fill_n(scratch.farthest, std::size(scratch.farthest), -std::numeric_limits<float>::infinity());
+  std::fill_n(scratch.farthest, tile.blocks(),
+              task.first_round ? kClearDepth : std::numeric_limits<float>::infinity());
   for (const FrontEnd* front_end : task.front_ends) {
     fetch(front_end->triangles.blocks(task.tile));
     fetch(front_end->small_triangles.blocks(task.tile));

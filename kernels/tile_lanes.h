@@ -152,6 +152,7 @@ struct TileScratch {
   Buffer<std::int32_t> ranks;  ///< kNoRank: nothing there yet
   TileTriangles triangles;
   Isa isa = Isa::kBaseline;
+  alignas(64) float farthest[64 + 16];        ///< of each block: at least the depths of its pixels
   std::int64_t hidden_entries = 0;            ///< triangles left out because all of the tile is nearer
   std::vector<std::uint64_t> order;           ///< of the large triangles: nearest depth, index
   Buffer<std::uint32_t> heads, ids, colours;  ///< of the runs of pixels that show one triangle
