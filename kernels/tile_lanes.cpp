@@ -107,6 +107,28 @@ template <NumericMode Mode>
   return covers<Mode>(Mode::prepare(triangle_of(block, i), grid, block.fields[9][i]), x, y);
 }
 
+/// Sorts `indices` by their values, but for those that differ by little. Finite values; `room` is for its
+/// use.
+void sort_roughly(const float* values, std::vector<std::uint32_t>& indices,
+                  std::vector<std::uint32_t>& room) {
+  if (indices.size() < 2) return;
+  float low = values[indices[0]], high = low;
+  for (const std::uint32_t i : indices) {
+    low = std::min(low, values[i]);
+    high = std::max(high, values[i]);
+  }
+  constexpr std::size_t kClasses = 64;
+  const float range = high - low;
+  const float scale = range > 0x1p-100f ? (kClasses - 1) / range : 0.0f;
+  const auto class_of = [&](std::uint32_t i) { return static_cast<std::size_t>((values[i] - low) * scale); };
+  std::uint32_t ends[kClasses + 1] = {};
+  for (const std::uint32_t i : indices) ++ends[class_of(i) + 1];
+  for (std::size_t c = 1; c <= kClasses; ++c) ends[c] += ends[c - 1];
+  room.swap(indices);
+  indices.resize(room.size());
+  for (const std::uint32_t i : room) indices[ends[class_of(i)]++] = i;
+}
+
 /// Appends survivor i to a tile.
 void append(const FrontEnd::Survivors& from, std::size_t i, std::int64_t tile, TriangleStreams& streams) {
   TriangleStreams::Block& block = streams.room(tile, 1);
@@ -648,7 +670,7 @@ HWY_INLINE float largest(const float* values, std::int32_t n) {
 template <class Arithmetic>
 void draw_triangles(TileScratch& scratch, const TileSettings& settings, TilePixels& tile) {
   TileTriangles& triangles = scratch.triangles;
-  std::vector<std::uint64_t>& order = scratch.order;
+  std::vector<std::uint32_t>& order = scratch.order;
   const bool rejects = settings.techniques.front_to_back;
   const auto box_area = [&](std::size_t i) {
     return (triangles.x1[i] - triangles.x0[i]) * (triangles.y1[i] - triangles.y0[i]);
@@ -657,18 +679,18 @@ void draw_triangles(TileScratch& scratch, const TileSettings& settings, TilePixe
   constexpr std::int32_t kLarge = 256;  // pixels of the box
   order.clear();
   for (std::size_t i = 0; i < triangles.size; ++i)
-    if (box_area(i) >= kLarge)
-      order.push_back(std::uint64_t{rasterbench::encode(triangles.nearest[i])} << 32 | i);
-  if (rejects) std::sort(order.begin(), order.end());
+    if (box_area(i) >= kLarge) order.push_back(static_cast<std::uint32_t>(i));
+  if (rejects) sort_roughly(triangles.nearest, order, scratch.unsorted);
   float* const farthest = scratch.farthest;
-  for (auto entry = order.begin(); entry != order.end(); ++entry) {
-    const auto i = static_cast<std::uint32_t>(*entry);
-    if (rejects && triangles.nearest[i] > largest(farthest, tile.blocks())) {
-      scratch.hidden_entries += order.end() - entry;
-      break;
+  float limit = largest(farthest, tile.blocks());
+  for (const std::uint32_t i : order) {
+    if (rejects && triangles.nearest[i] > limit) {
+      ++scratch.hidden_entries;
+      continue;
     }
     scratch.hidden_entries +=
         draw_in_blocks<Arithmetic>(triangles, i, settings.fill, tile, farthest, rejects);
+    limit = largest(farthest, tile.blocks());
   }
   const std::int64_t area = std::int64_t{tile.width()} * tile.height();
   std::int64_t drawn = 0;
@@ -736,6 +758,10 @@ void resolve(const TilePixels& tile, const TileSettings& settings, TileScratch& 
   constexpr std::int32_t kWidest = 128;
   alignas(64) std::uint32_t row_colours[kWidest + kLanes];
   alignas(64) float row_depths[kWidest + kLanes];
+  const bool is_aligned = settings.grid.width % kWidth == 0 && width % kWidth == 0 &&
+                          tile.box.x0 % kWidth == 0 &&
+                          reinterpret_cast<std::uintptr_t>(output.colours) % 64 == 0 &&
+                          reinterpret_cast<std::uintptr_t>(output.depths) % 64 == 0;
   const std::uint32_t* head = heads;
   const std::uint32_t* colour = colours;
   for (std::int32_t y = 0; y < tile.height(); ++y) {
@@ -746,19 +772,27 @@ void resolve(const TilePixels& tile, const TileSettings& settings, TileScratch& 
       for (std::uint32_t x = *head; x < head[1]; x += kLanes) hn::StoreU(v, kCodes, row_colours + x);
     }
     ++head;
-    for (std::int32_t x = 0; x < width; x += kWidth) {
+    const std::int64_t at = std::int64_t{tile.box.y0 + y} * settings.grid.width + tile.box.x0;
+    const auto depth_at_column = [&](std::int32_t x) HWY_ATTR {
       const auto empty = hn::RebindMask(kFloats, hn::Eq(hn::LoadU(kIntegers, ranks + x), integer(kNoRank)));
       // Zero added, -0 becomes +0, as in the keys of the mode.
       const Float depth = hn::Add(hn::LoadU(kFloats, depths + x), hn::Zero(kFloats));
-      hn::StoreU(hn::IfThenElse(empty, hn::Set(kFloats, 1.0f), depth), kFloats, row_depths + x);
-    }
-    const std::int64_t at = std::int64_t{tile.box.y0 + y} * settings.grid.width + tile.box.x0;
-    if (settings.techniques.streaming) {
-      stream_row(row_colours, static_cast<std::size_t>(width), output.colours + at);
-      stream_row(row_depths, static_cast<std::size_t>(width), output.depths + at);
+      return hn::IfThenElse(empty, hn::Set(kFloats, 1.0f), depth);
+    };
+    if (settings.techniques.streaming && is_aligned) {
+      for (std::int32_t x = 0; x < width; x += kWidth)
+        hn::Stream(hn::Load(kCodes, row_colours + x), kCodes, output.colours + at + x);
+      for (std::int32_t x = 0; x < width; x += kWidth)
+        hn::Stream(depth_at_column(x), kFloats, output.depths + at + x);
     } else {
-      std::copy_n(row_colours, width, output.colours + at);
-      std::copy_n(row_depths, width, output.depths + at);
+      for (std::int32_t x = 0; x < width; x += kWidth) hn::Store(depth_at_column(x), kFloats, row_depths + x);
+      if (settings.techniques.streaming) {
+        stream_row(row_colours, static_cast<std::size_t>(width), output.colours + at);
+        stream_row(row_depths, static_cast<std::size_t>(width), output.depths + at);
+      } else {
+        std::copy_n(row_colours, width, output.colours + at);
+        std::copy_n(row_depths, width, output.depths + at);
+      }
     }
     if (output.ids != nullptr)
       for (std::int32_t x = 0; x < width; ++x)

@@ -140,11 +140,12 @@ struct TileScratch {
         ids(depths.size(), "a tile"),
         colours(depths.size(), "a tile") {
     order.reserve(TileTriangles::kRoom);
+    unsorted.reserve(TileTriangles::kRoom);
   }
 
   std::size_t bytes() const {
     return depths.bytes() + ranks.bytes() + heads.bytes() + ids.bytes() + colours.bytes() +
-           order.capacity() * sizeof(order[0]);
+           (order.capacity() + unsorted.capacity()) * sizeof(order[0]);
   }
 
   Buffer<float>
@@ -152,10 +153,10 @@ struct TileScratch {
   Buffer<std::int32_t> ranks;  ///< kNoRank: nothing there yet
   TileTriangles triangles;
   Isa isa = Isa::kBaseline;
-  alignas(64) float farthest[64 + 16];        ///< of each block: at least the depths of its pixels
-  std::int64_t hidden_entries = 0;            ///< triangles left out because all of the tile is nearer
-  std::vector<std::uint64_t> order;           ///< of the large triangles: nearest depth, index
-  Buffer<std::uint32_t> heads, ids, colours;  ///< of the runs of pixels that show one triangle
+  alignas(64) float farthest[64 + 16];         ///< of each block: at least the depths of its pixels
+  std::int64_t hidden_entries = 0;             ///< triangles left out because all of the tile is nearer
+  std::vector<std::uint32_t> order, unsorted;  ///< of the large triangles: their indices
+  Buffer<std::uint32_t> heads, ids, colours;   ///< of the runs of pixels that show one triangle
 };
 
 inline constexpr std::int32_t kNoRank = 0x7fffffff;  ///< above every rank: T <= 2^31 - 1
