@@ -18,7 +18,7 @@ STAGES = ("clear", "geometry", "raster", "resolve")
 COUNTED = {"wrong", "exact_ties", "edge", "depth", "unexplained", "unbounded", "predicted", "wrong_on_snapped", "worst_distance_px",
            "max_depth_error_steps", "ambiguous", "edge_ties", "depth_ties", "errors", "false_positives", "false_negatives"}
 STATUSES = ("ok", "failed", "skipped")
-TECHNIQUES = ("fragments", "front_to_back", "streaming", "huge_pages")  # in the program's order
+TECHNIQUES = ("fragments", "blocks", "front_to_back", "streaming", "huge_pages")  # in the program's order
 PEERS = ("llvmpipe",)  # other programs that draw the same pictures; as a record's backend
 
 

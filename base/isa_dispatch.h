@@ -39,3 +39,10 @@ inline std::size_t dispatch_index(Isa isa) {
 /// Calls the variant of `function`, which HWY_EXPORT has named, for an instruction set other than kBaseline.
 #define RASTERBENCH_DISPATCH(function, isa) \
   (*(HWY_DISPATCH_TABLE(function)[::rasterbench::dispatch_index(isa)]))
+
+/// A pointer to the variant of `function` for an instruction set; for kBaseline to the one of the static
+/// target, which compiles for a single lane.
+#define RASTERBENCH_VARIANT(function, isa) \
+  ((isa) == ::rasterbench::Isa::kBaseline  \
+       ? HWY_STATIC_DISPATCH(function)     \
+       : HWY_DISPATCH_TABLE(function)[::rasterbench::dispatch_index(isa)])

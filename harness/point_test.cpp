@@ -60,7 +60,7 @@ TEST(Point, KeepsTheTechniquesThatItsKernelHas) {
   EXPECT_EQ(config_of(with("tile_parallel", "huge_pages")), "huge_pages");
   EXPECT_EQ(config_of(with("tile_parallel", "fragments")), "none");
   EXPECT_EQ(config_of(with("ray_cast", "all")), "none");
-  EXPECT_EQ(config_of(with("fused_tiles", "all-fragments-front_to_back")), of_frame);
+  EXPECT_EQ(config_of(with("fused_tiles", "all-fragments-blocks-front_to_back")), of_frame);
   EXPECT_EQ(config_of(with("fused_tiles", "all")), has_vectors ? "all" : "all-streaming");
   EXPECT_TRUE(config_of(peer_point("llvmpipe", {}, 1, 1, 1)).is_null());
 

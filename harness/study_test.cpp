@@ -77,7 +77,7 @@ isa = "baseline"
                                       "fused_tiles" + rest + "/techniques:none",
                                       "fused_tiles" + rest + "/techniques:huge_pages",
                                       "fused_tiles" + rest + "/techniques:fragments+huge_pages",
-                                      "fused_tiles" + rest + "/techniques:front_to_back+huge_pages"}));
+                                      "fused_tiles" + rest + "/techniques:blocks+front_to_back+huge_pages"}));
   for (const PlannedPoint& planned : study.points)
     EXPECT_EQ(comparison_of(planned.point), comparison_of(study.points.front().point));
   EXPECT_NE(error_of(kSweep + "kernel = \"scanline\"\ntechniques = \"streeming\"\n")

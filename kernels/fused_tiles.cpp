@@ -55,9 +55,10 @@ class FusedTiles final : public Renderer {
         permutation_seed_(setup.permutation_seed),
         stream_budget_(setup.stream_budget),
         count_(setup.count),
-        is_fixed_(mode == Fixed8::kInfo.name),
+        is_fixed_(is_fixed_8(mode)),
         execution_(make_execution(setup.execution)),
-        lanes_(tile_lanes(settings_.geometry.isa, mode)),
+        front_end_lanes_(front_end_lanes(settings_.geometry.isa, mode)),
+        draw_tile_(tile_lanes(settings_.geometry.isa, mode)),
         tile_settings_{.grid = TileGrid(settings_.width, settings_.height, tile_shift(settings_.tile)),
                        .fill = settings_.fill,
                        .tie = settings_.tie,
@@ -218,9 +219,9 @@ class FusedTiles final : public Renderer {
   }
 
   bool append(const ScreenBatch<float>& screen, Worker& worker) {
-    lanes_.select(screen, tile_settings_, worker.front_end);
+    front_end_lanes_.select(screen, tile_settings_, worker.front_end);
     worker.is_full = !worker.front_end.has_room();
-    if (!worker.is_full) lanes_.distribute(tile_settings_, worker.front_end);
+    if (!worker.is_full) front_end_lanes_.distribute(tile_settings_, worker.front_end);
     return !worker.is_full;
   }
 
@@ -256,8 +257,8 @@ class FusedTiles final : public Renderer {
     }
     const TileOutput output{scene_, colours_.data(), depths_.data(), ids_.size() > 0 ? ids_.data() : nullptr};
     execution_->loop(tile_settings_.grid.tiles(), [&](std::int64_t tile, int worker) {
-      lanes_.draw({tile, front_ends_, kept_depths_.data(), kept_ranks_.data(), first_round, last_round},
-                  tile_settings_, workers_[static_cast<std::size_t>(worker)]->scratch, output);
+      draw_tile_({tile, front_ends_, kept_depths_.data(), kept_ranks_.data(), first_round, last_round},
+                 tile_settings_, workers_[static_cast<std::size_t>(worker)]->scratch, output);
     });
   }
 
@@ -311,7 +312,8 @@ class FusedTiles final : public Renderer {
   bool count_;
   bool is_fixed_;  ///< fixed_8, else filtered
   std::unique_ptr<Execution> execution_;
-  const TileLanes& lanes_;
+  FrontEndLanes front_end_lanes_;
+  DrawTile draw_tile_;
   TileSettings tile_settings_;
   std::vector<Batch> batches_;
   std::vector<std::uint32_t> order_;  ///< in which the batches are taken

@@ -43,6 +43,7 @@ namespace rasterbench {
 struct PixelBox {
   std::int32_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
 
+  bool operator==(const PixelBox&) const = default;
   bool empty() const { return x0 >= x1 || y0 >= y1; }
   bool contains(std::int32_t x, std::int32_t y) const { return x >= x0 && x < x1 && y >= y0 && y < y1; }
 };

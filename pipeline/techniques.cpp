@@ -14,6 +14,8 @@ namespace {
 constexpr TechniqueInfo kInfos[] = {
     {"fragments", "tiny triangles are sampled where they are transformed, not in their tile",
      &Techniques::fragments},
+    {"blocks", "large triangles are tested against edges and depths, and drawn, by blocks of 16 x 16 pixels",
+     &Techniques::blocks},
     {"front_to_back", "large triangles of a tile are drawn in order of depth, and what is hidden is left out",
      &Techniques::front_to_back},
     {"streaming", "colours and depths bypass the caches on their way to memory (not with isa baseline)",

@@ -11,6 +11,7 @@ namespace rasterbench {
 /// Which techniques a frame uses, or which ones a kernel has.
 struct Techniques {
   bool fragments = true;      ///< tiny triangles are sampled where they are transformed
+  bool blocks = true;         ///< large triangles are tested and drawn by blocks of 16 x 16 pixels
   bool front_to_back = true;  ///< large triangles of a tile in order of depth; what is hidden is left out
   bool streaming = true;      ///< colours and depths bypass the caches on their way to memory
   bool huge_pages = true;     ///< buffers lie in pages of 2 MiB where the system has them
@@ -18,9 +19,9 @@ struct Techniques {
   bool operator==(const Techniques&) const = default;
 };
 
-inline constexpr Techniques kNoTechniques{false, false, false, false};
+inline constexpr Techniques kNoTechniques{false, false, false, false, false};
 /// Those of the stages around a staged kernel (pipeline/frame_renderer.h).
-inline constexpr Techniques kFrameTechniques{false, false, true, true};
+inline constexpr Techniques kFrameTechniques{false, false, false, true, true};
 
 struct TechniqueInfo {
   std::string_view name;

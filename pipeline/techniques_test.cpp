@@ -61,8 +61,10 @@ TEST(Techniques, TextsAreCanonical) {
   EXPECT_EQ(to_string(kFrameTechniques), "streaming+huge_pages");
   EXPECT_EQ(to_string(parse_techniques("huge_pages+streaming", "x")), "streaming+huge_pages");
   EXPECT_EQ(to_string(parse_techniques("all-fragments", "x")), "all-fragments");
-  EXPECT_EQ(to_string(parse_techniques("huge_pages+streaming+front_to_back", "x")), "all-fragments");
-  EXPECT_EQ(to_string(parse_techniques("all-fragments-front_to_back", "x")), "streaming+huge_pages");
+  EXPECT_EQ(to_string(parse_techniques("huge_pages+streaming+front_to_back", "x")),
+            "front_to_back+streaming+huge_pages");
+  EXPECT_EQ(to_string(parse_techniques("huge_pages+streaming+front_to_back+blocks", "x")), "all-fragments");
+  EXPECT_EQ(to_string(parse_techniques("all-fragments-front_to_back", "x")), "blocks+streaming+huge_pages");
 }
 
 TEST(Techniques, ErrorsNameTheFieldAndTheNearestName) {

@@ -47,7 +47,7 @@ def test_kernels() -> None:
 
 def test_techniques_say_who_has_them() -> None:
     techniques = {t["name"]: t for t in listed("techniques")}
-    assert list(techniques) == ["fragments", "front_to_back", "streaming", "huge_pages"] and all(t["meaning"] for t in techniques.values())
+    assert list(techniques) == ["fragments", "blocks", "front_to_back", "streaming", "huge_pages"] and all(t["meaning"] for t in techniques.values())
     assert techniques["fragments"]["kernels"] == techniques["front_to_back"]["kernels"] == ["fused_tiles"]
     assert set(techniques["streaming"]["kernels"]) == set(techniques["huge_pages"]["kernels"]) >= KERNELS | {"fused_tiles"}
     has = {k["name"]: k["techniques"] for k in listed("kernels")}
