@@ -139,10 +139,10 @@ HWY_INLINE Integer narrow(const Wide& v, Function function) {
                      hn::DemoteTo(kHalfIntegers, function(v.parts[0])));
 #endif
 }
-/// Rounded to the nearest.
+/// Rounded to the nearest, infinite beyond the largest float.
 HWY_INLINE Float narrow(const Wide& v) {
-#if HWY_TARGET == HWY_SCALAR
-  return hn::DemoteTo(kHalfFloats, v.parts[0]);
+#if HWY_TARGET == HWY_SCALAR  // whose DemoteTo() gives the largest float in place of infinity
+  return hn::Set(kFloats, static_cast<float>(hn::GetLane(v.parts[0])));
 #else
   return hn::Combine(kFloats, hn::DemoteTo(kHalfFloats, v.parts[1]), hn::DemoteTo(kHalfFloats, v.parts[0]));
 #endif
