@@ -1,4 +1,4 @@
-"""Command line: python3 -m analysis report DIR, table DIR, speed DIR, stability FILE."""
+"""Command line: python3 -m analysis report DIR, table DIR, speed DIR, compare DIR_A DIR_B, stability FILE."""
 
 from __future__ import annotations
 
@@ -18,9 +18,17 @@ class Parser(argparse.ArgumentParser):
         raise SystemExit(2)
 
 
+def share(words: str) -> float:
+    value = float(words)
+    if not 0 < value < 1:
+        raise argparse.ArgumentTypeError(f"{words} is not between 0 and 1")
+    return value
+
+
 def parser() -> Parser:
     main = Parser(prog="python3 -m analysis", description="Turns the records of a study into figures, tables and a report.",
-                  epilog="Exit codes: 0 done, 2 bad input or usage (one line on stderr).")
+                  epilog="Exit codes: 0 done, 1 compare found a point that is slower or lost, 2 bad input or usage (one line on"
+                         " stderr).")
     main.add_argument("--version", action="version", version=f"rasterbench analysis {__version__}")
     commands = main.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=Parser)
     report = commands.add_parser("report", help="write report.html, figures/ and tables/ and print three findings",
@@ -36,6 +44,21 @@ def parser() -> Parser:
     for command in (report, table, speed):
         command.add_argument("directory", metavar="DIR", type=Path,
                              help="folder of a study, with context.json and records.jsonl (see harness/records.md)")
+    compare = commands.add_parser("compare", help="compare two runs, point by point",
+                                  description="Says of each point whether B is FASTER or SLOWER than A, the SAME within the margin, or"
+                                              " AMBIGUOUS, with the ratio of their times and its 95 %% interval. Refuses (exit code 2)"
+                                              " where the recorded context differs. Exit code 1: a point is slower, or lost.")
+    for name, what in (("a", "the run that is compared with"), ("b", "the run that is judged")):
+        compare.add_argument(name, metavar=f"DIR_{name.upper()}", type=Path,
+                             help=f"{what}: folder of a study, or a file of Google Benchmark's JSON")
+    compare.add_argument("--ignore", metavar="KEY", action="append", default=[],
+                         help="a key of context.json, or of a record's config as config.KEY, that may differ, with all that lies in it"
+                              " (program, machine.kernel, ...); points: points that B has not; may be given several times")
+    compare.add_argument("--margin", metavar="SHARE", type=share,
+                         help="differences within it are SAME (default: the studies' target, else 0.02)")
+    compare.add_argument("--one-launch", action="store_true",
+                         help="judge runs of one launch, too, whose differences may be those of two launches (default: AMBIGUOUS)")
+    compare.add_argument("--csv", metavar="FILE", type=Path, help="also write the points as CSV")
     stability = commands.add_parser("stability", help="draw the stability envelopes of numeric modes and list their breaking points",
                                     description="Writes FOLDER/stability.png, .svg, .pdf, .csv, .tex and its caption, .txt, then"
                                                 " prints where each numeric mode breaks.")
@@ -55,6 +78,15 @@ def main(arguments: list[str] | None = None) -> int:
             print(stability.plain(options.file))
             print(f"written: {', '.join(map(str, written))}")
             return 0
+        if options.command == "compare":
+            from . import compare, writing
+
+            outcome = compare.compare(compare.read(options.a), compare.read(options.b), options.ignore, options.margin,
+                                      options.one_launch)
+            if options.csv:
+                writing.write(options.csv, compare.csv(outcome))
+            print(compare.plain(outcome))
+            return outcome.status
         study = load(options.directory)
         # Imported late: a wrong path should not wait for matplotlib.
         from .comparison import Analysis
@@ -80,7 +112,8 @@ def main(arguments: list[str] | None = None) -> int:
     except BrokenPipeError:
         return 0
     except OSError as error:
-        print(f"analysis: {error.filename or vars(options).get('directory') or options.file}: {error.strerror or error}", file=sys.stderr)
+        given = vars(options).get("directory") or vars(options).get("csv") or vars(options).get("file")
+        print(f"analysis: {error.filename or given}: {error.strerror or error}", file=sys.stderr)
         return 2
     print(f"report: {written.path}")
     for finding in written.findings:

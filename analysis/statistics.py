@@ -20,6 +20,7 @@ RESAMPLES = 2000
 SEED = 20240229  # fixed, so that the same records always give the same report
 MIN_SAMPLES = 6  # below it, [min, max] covers the median with less than 95 %
 MIN_LAUNCHES = 5
+ONE_LAUNCH = "one launch"
 SIGNED_RANK, RANK_SUM, WELCH = "Wilcoxon signed-rank", "Mann-Whitney", "Welch t on logarithms"
 
 
@@ -288,6 +289,42 @@ def launch_test(slower: Samples, faster: Samples) -> float:
     if np.ptp(means) == 0:
         return 0.0 if means[0] else 1.0
     return float(stats.ttest_1samp(means, 0.0).pvalue)
+
+
+def launch_medians(samples: Samples) -> np.ndarray:
+    """The logarithm of each launch's median: what repeats independently in a run."""
+    return np.log([np.median(group) for group in samples.by_launch()])
+
+
+def between_runs(samples: Samples, base: Samples) -> tuple[Estimate, float]:
+    """Ratio of the medians of two runs, samples / base, and the two-sided p of no difference.
+
+    Runs share no blocks and no drift, so nothing is paired. Launches are what repeats: p is Welch's t on the logarithms of
+    their medians, and the interval is the wider of that test's and of the bootstrap over launches, then blocks, which
+    alone is too narrow for few launches. With one launch on either side the samples have to stand for launches, which
+    they cannot (another launch has another memory layout): p is Mann-Whitney's and the note says so.
+    """
+    value = float(np.median(samples.values) / np.median(base.values))
+    n = min(samples.n, base.n)
+    if n < MIN_SAMPLES:
+        return Estimate(value, None, None, n, "none", f"fewer than {MIN_SAMPLES} samples"), 1.0
+    above, below = _resampled_medians(samples.by_launch()), _resampled_medians(base.by_launch(), SEED + 1)
+    low, high = _quantiles(above / below)
+    if min(samples.launch_count, base.launch_count) < 2:
+        p = float(stats.mannwhitneyu(samples.values, base.values, alternative="two-sided").pvalue)
+        return Estimate(value, low, high, n, "bootstrap over blocks", ONE_LAUNCH), p
+    a, b = launch_medians(samples), launch_medians(base)
+    # Welch (1947): the degrees of freedom of Satterthwaite.
+    variances = a.var(ddof=1) / len(a), b.var(ddof=1) / len(b)
+    error = math.sqrt(sum(variances))
+    shift = float(a.mean() - b.mean())
+    if error == 0:
+        return Estimate(value, low, high, n, "bootstrap over launches, then blocks"), 0.0 if shift else 1.0
+    freedom = error**4 / (variances[0] ** 2 / (len(a) - 1) + variances[1] ** 2 / (len(b) - 1))
+    half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, freedom)) * error
+    p = float(2 * stats.t.sf(abs(shift) / error, freedom))
+    return Estimate(value, min(low, math.exp(shift - half)), max(high, math.exp(shift + half)), n,
+                    "Welch t over launches, or bootstrap where wider"), p
 
 
 def superiority(slower: Samples, faster: Samples) -> float:
