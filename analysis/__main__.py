@@ -27,8 +27,8 @@ def share(words: str) -> float:
 
 def parser() -> Parser:
     main = Parser(prog="python3 -m analysis", description="Turns the records of a study into figures, tables and a report.",
-                  epilog="Exit codes: 0 done, 1 compare found a point that is slower or lost, 2 bad input or usage (one line on"
-                         " stderr).")
+                  epilog="Exit codes: 0 done, 1 compare found a slower point, 2 bad input or usage (one line on stderr), 3 compare"
+                         " found a point that only A has, or that failed in B.")
     main.add_argument("--version", action="version", version=f"rasterbench analysis {__version__}")
     commands = main.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=Parser)
     report = commands.add_parser("report", help="write report.html, figures/ and tables/ and print three findings",
@@ -46,8 +46,9 @@ def parser() -> Parser:
                              help="folder of a study, with context.json and records.jsonl (see harness/records.md)")
     compare = commands.add_parser("compare", help="compare two runs, point by point",
                                   description="Says of each point whether B is FASTER or SLOWER than A, the SAME within the margin, or"
-                                              " AMBIGUOUS, with the ratio of their times and its 95 %% interval. Refuses (exit code 2)"
-                                              " where the recorded context differs. Exit code 1: a point is slower, or lost.")
+                                              " AMBIGUOUS, with the ratio of their times and its 95 %% interval. Exit codes: 0 nothing"
+                                              " is slower, 1 a point is slower, 2 bad input, or the recorded contexts differ (one line"
+                                              " a difference), 3 a point was lost.")
     for name, what in (("a", "the run that is compared with"), ("b", "the run that is judged")):
         compare.add_argument(name, metavar=f"DIR_{name.upper()}", type=Path,
                              help=f"{what}: folder of a study, or a file of Google Benchmark's JSON")
@@ -58,7 +59,8 @@ def parser() -> Parser:
                          help="differences within it are SAME (default: the studies' target, else 0.02)")
     compare.add_argument("--one-launch", action="store_true",
                          help="judge runs of one launch, too, whose differences may be those of two launches (default: AMBIGUOUS)")
-    compare.add_argument("--csv", metavar="FILE", type=Path, help="also write the points as CSV")
+    compare.add_argument("--json", action="store_true", help="print JSON instead of text")
+    compare.add_argument("-o", "--out", metavar="FOLDER", type=Path, help="also write comparison.csv, .tex, .json and its figure")
     stability = commands.add_parser("stability", help="draw the stability envelopes of numeric modes and list their breaking points",
                                     description="Writes FOLDER/stability.png, .svg, .pdf, .csv, .tex and its caption, .txt, then"
                                                 " prints where each numeric mode breaks.")
@@ -79,13 +81,16 @@ def main(arguments: list[str] | None = None) -> int:
             print(f"written: {', '.join(map(str, written))}")
             return 0
         if options.command == "compare":
-            from . import compare, writing
+            from . import compare
 
             outcome = compare.compare(compare.read(options.a), compare.read(options.b), options.ignore, options.margin,
                                       options.one_launch)
-            if options.csv:
-                writing.write(options.csv, compare.csv(outcome))
-            print(compare.plain(outcome))
+            from . import comparison_output
+
+            written = comparison_output.write(outcome, options.out) if options.out else []
+            print(comparison_output.as_json(outcome) if options.json else comparison_output.plain(outcome))
+            if written and not options.json:
+                print(f"written: {', '.join(map(str, written))}")
             return outcome.status
         study = load(options.directory)
         # Imported late: a wrong path should not wait for matplotlib.
@@ -107,12 +112,14 @@ def main(arguments: list[str] | None = None) -> int:
 
         written = report.write(Analysis(study), options.out)
     except InputError as error:
+        for line in getattr(error, "lines", ()):
+            print(f"analysis: {line}", file=sys.stderr)
         print(f"analysis: {error}", file=sys.stderr)
         return 2
     except BrokenPipeError:
         return 0
     except OSError as error:
-        given = vars(options).get("directory") or vars(options).get("csv") or vars(options).get("file")
+        given = vars(options).get("directory") or vars(options).get("out") or vars(options).get("file")
         print(f"analysis: {error.filename or given}: {error.strerror or error}", file=sys.stderr)
         return 2
     print(f"report: {written.path}")

@@ -10,12 +10,26 @@ from .load import Record
 
 
 @dataclass(frozen=True)
+class Facts:
+    """What a caption says, for programs: the file beside each figure has it, and the linter reads it. None: nothing of it is
+    shown (no estimates, no base), or it is unknown (no interval)."""
+
+    estimates: str | None  # "medians", ...
+    interval: str | None  # kind of the 95 % intervals
+    base: str | None
+    samples: tuple[int, int] | None  # fewest and most of a point
+    launches: tuple[int, int] | None
+    machine: str | None
+
+
+@dataclass(frozen=True)
 class Caption:
     """title: what it is · body: base, n, interval, machine · reading: how to read it, in one line."""
 
     title: str
     body: str
     reading: str
+    facts: Facts | None = None
 
     @property
     def plain(self) -> str:
@@ -26,6 +40,7 @@ def build(analysis: Analysis, title: str, reading: str, shown: list[Record], *, 
           kind: str | None = None, base: str = "", notes: list[str] | None = None) -> Caption:
     """The body of every caption has the same order: what is drawn, base, interval and n, notes, machine."""
     sentences = []
+    timed = [record.samples for record in shown if record.ok]
     if estimates and shown:
         kind = analysis.interval_kind(shown) if kind is None else kind
         size = analysis.sampled(shown) + " samples a point"
@@ -34,8 +49,12 @@ def build(analysis: Analysis, title: str, reading: str, shown: list[Record], *, 
     if base:
         sentences.append(base)
     sentences += notes or []
-    launches = {record.samples.launch_count for record in shown if record.ok}
+    launches = [samples.launch_count for samples in timed]
+    counts = [samples.n for samples in timed]
+    facts = Facts(estimates if shown else None, kind or None if estimates and shown else None, base or None,
+                  (min(counts), max(counts)) if counts else None, (min(launches), max(launches)) if launches else None,
+                  analysis.machine)
     if launches:
         sentences.append(f"{text.count(max(launches), 'launch', 'launches')}.")
     sentences.append(f"Machine: {analysis.machine}.")
-    return Caption(title, " ".join(sentences), reading)
+    return Caption(title, " ".join(sentences), reading, facts)

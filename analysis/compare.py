@@ -1,20 +1,17 @@
 """Two runs, point by point: is B faster than A? Built for changes of the program, the compiler, the machine's set-up.
 
-A verdict needs both directions of evidence: FASTER and SLOWER a difference that the launches of both runs show after Holm's
-correction over all points; SAME an interval that lies within the margin; everything else is AMBIGUOUS, which is no
-"no difference". A difference within the margin is SAME: it exists, and is too small to care.
+Every verdict needs evidence. FASTER and SLOWER: an interval of the ratio that excludes 1, and a difference of the samples
+and of the launches of both runs after Holm's correction over all points. SAME: an interval within the margin, where a
+difference may exist and is too small to care. Everything else is AMBIGUOUS, which does not mean "no difference".
 """
 
 from __future__ import annotations
 
-import io
-from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Sequence
 
 import numpy as np
-import pandas as pd
 
 from . import contexts, google_benchmark, statistics, text
 from .load import InputError, Record, load
@@ -22,7 +19,16 @@ from .statistics import Estimate, Samples
 
 FASTER, SLOWER, SAME, AMBIGUOUS, LOST = "FASTER", "SLOWER", "SAME", "AMBIGUOUS", "LOST"
 POINTS = "points"  # for --ignore: points that only one run has
+VERDICTS = (SLOWER, FASTER, AMBIGUOUS, SAME, LOST)
 COMMON_SHIFT_SHARE = 0.9  # of the points on one side of 1: then say that the whole run moved
+
+
+class Refused(InputError):
+    """Runs that were recorded under other conditions; one line a condition."""
+
+    def __init__(self, path: Path, found: Sequence[contexts.Difference]) -> None:
+        super().__init__(path, "name with --ignore what is meant to differ", None, f"{text.count(len(found), 'difference')} to A")
+        self.lines = [f"{path}: {difference.key}: {difference.words}" for difference in found]
 
 
 @dataclass(frozen=True)
@@ -45,7 +51,7 @@ class Row:
     b: Samples | None
     ratio: Estimate | None  # time of B / time of A
     p: float
-    superiority: float  # chance that a sample of B takes longer than one of A
+    superiority: float  # Vargha and Delaney's A: chance that a sample of B takes longer than one of A
     verdict: str
     why: str
 
@@ -57,12 +63,14 @@ class Outcome:
     rows: list[Row]
     margin: float
     ignored: list[contexts.Difference]
+    only_a: list[str]  # only where --ignore points allows it; else they are LOST
     only_b: list[str]
 
     @property
     def status(self) -> int:
-        """For CI: 1 if a point got slower or was lost."""
-        return int(any(row.verdict in (SLOWER, LOST) for row in self.rows))
+        """For CI: 3 if a point was lost, else 1 if one got slower, else 0."""
+        found = {row.verdict for row in self.rows}
+        return 3 if LOST in found else int(SLOWER in found)
 
 
 def read(path: Path) -> Run:
@@ -93,13 +101,12 @@ def _facts(record: Record) -> dict[str, Any]:
 
 
 def compare(a: Run, b: Run, ignore: Sequence[str] = (), margin: float | None = None, one_launch: bool = False) -> Outcome:
-    """Raises InputError where the runs differ in a recorded condition that is not ignored."""
+    """Raises Refused where the runs differ in a recorded condition that is not ignored."""
     found = contexts.differences(a.context, b.context, shared_only=not (a.complete and b.complete))
     found += _point_differences(a, b)
     refused = [difference for difference in found if not contexts.under(difference.key, ignore)]
     if refused:
-        more = f"; also {text.listing([d.key for d in refused[1:]], 8)}" if refused[1:] else ""
-        raise InputError(b.path, f"{refused[0].words}{more} (name with --ignore what is meant to differ)", None, refused[0].key)
+        raise Refused(b.path, refused)
     common = [name for name in a.samples if name in b.samples]
     if not common and not any(name in b.untimed for name in a.samples):
         raise InputError(b.path, f"no point of it has the name of a timed point of {a.path}")
@@ -108,10 +115,12 @@ def compare(a: Run, b: Run, ignore: Sequence[str] = (), margin: float | None = N
     corrected = dict(zip(common, statistics.holm([tested[name][1] for name in common])))
     rows = [_row(name, a.samples[name], b.samples[name], tested[name][0], corrected[name], margin, one_launch) for name in common]
     rows.sort(key=lambda row: row.ratio.value, reverse=True)
-    lost = [name for name in a.samples if name not in b.samples and (name in b.untimed or POINTS not in ignore)]
+    missing = [name for name in a.samples if name not in b.samples]
+    lost = [name for name in missing if name in b.untimed or POINTS not in ignore]
     rows += [Row(name, a.samples[name], None, None, 1.0, 0.5, LOST, b.untimed.get(name, "not in B")) for name in lost]
+    only_a = [name for name in missing if name not in lost]
     only_b = [name for name in b.samples if name not in a.samples]
-    return Outcome(a, b, rows, margin, [d for d in found if d not in refused], only_b)
+    return Outcome(a, b, rows, margin, [d for d in found if d not in refused], only_a, only_b)
 
 
 def _point_differences(a: Run, b: Run) -> list[contexts.Difference]:
@@ -147,51 +156,3 @@ def common_shift(outcome: Outcome) -> float | None:
     if len(values) < 8 or max(np.mean(values > 1), np.mean(values < 1)) < COMMON_SHIFT_SHARE:
         return None
     return float(np.median(values))
-
-
-def table(outcome: Outcome) -> pd.DataFrame:
-    rows = []
-    for row in outcome.rows:
-        ratio = row.ratio
-        rows.append({"verdict": row.verdict, "point": row.name, "a_ms": float(np.median(row.a.values)),
-                     "b_ms": float(np.median(row.b.values)) if row.b is not None else None,
-                     "b_over_a": ratio.value if ratio else None, "low": ratio.low if ratio else None,
-                     "high": ratio.high if ratio else None, "p_holm": row.p, "superiority": row.superiority,
-                     "n_a": row.a.n, "n_b": row.b.n if row.b is not None else 0, "why": row.why})
-    return pd.DataFrame(rows)
-
-
-def csv(outcome: Outcome) -> str:
-    out = io.StringIO()
-    table(outcome).to_csv(out, index=False)
-    return out.getvalue()
-
-
-def plain(outcome: Outcome) -> str:
-    """Every point, the slowest change first, then the counts and what else a reader has to know."""
-    lines = [f"A {outcome.a.path}", f"B {outcome.b.path}", "",
-             f"{'verdict':<10} {'time B / A':<22} {'A':>10} {'B':>10}  point"]
-    for row in outcome.rows:
-        if row.ratio is None:
-            lines.append(f"{row.verdict:<10} {row.why:<22} {text.number(float(np.median(row.a.values))):>7} ms {'':>10}  {row.name}")
-            continue
-        quotient = text.estimate(row.ratio.value, row.ratio.low, row.ratio.high)
-        a, b = (text.number(float(np.median(s.values))) for s in (row.a, row.b))
-        lines.append(f"{row.verdict:<10} {quotient:<22} {a:>7} ms {b:>7} ms  {row.name}")
-    counts = Counter(row.verdict for row in outcome.rows)
-    lines += ["", ", ".join(f"{counts[verdict]} {verdict}" for verdict in (FASTER, SLOWER, SAME, AMBIGUOUS, LOST) if counts[verdict])
-              + f" of {text.count(len(outcome.rows), 'point')}; SAME means within {text.percent(outcome.margin)};"
-              " brackets are 95 % intervals of the ratio."]
-    whys = Counter(row.why for row in outcome.rows if row.verdict == AMBIGUOUS)
-    lines += [f"Ambiguous: {many} because {why}." for why, many in whys.most_common()]
-    shift = common_shift(outcome)
-    if shift is not None:
-        lines.append(f"Nearly every point moved to the same side, by {text.percent(abs(shift - 1))} in the median: a change of the"
-                     " machine between the runs looks like this, too; repeat A before you blame B.")
-    if outcome.only_b:
-        lines.append(f"Only in B: {text.listing(outcome.only_b)}.")
-    if outcome.ignored:
-        lines.append("Differs, as allowed by --ignore: " + "; ".join(f"{d.key}: {d.words}" for d in outcome.ignored) + ".")
-    if not (outcome.a.complete and outcome.b.complete):
-        lines.append("Google Benchmark's JSON records little of the set-up: only host and CPUs were compared.")
-    return "\n".join(lines)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -94,6 +95,7 @@ class Study:
     context: dict[str, Any]
     records: list[Record]
     peers: list[Record] = field(default_factory=list)
+    records_hash: str = ""  # of the bytes of records.jsonl
 
     @property
     def every_record(self) -> list[Record]:
@@ -150,7 +152,8 @@ def load(directory: Path) -> Study:
         raise InputError(directory, "no such folder (expected the folder that a study wrote)")
     context = _context(directory / "context.json")
     records = _records(directory / "records.jsonl")
-    return Study(directory, context, [r for r in records if not r.config.is_peer], [r for r in records if r.config.is_peer])
+    digest = hashlib.sha256((directory / "records.jsonl").read_bytes()).hexdigest()[:32]
+    return Study(directory, context, [r for r in records if not r.config.is_peer], [r for r in records if r.config.is_peer], digest)
 
 
 def read_text(path: Path, missing: str = "no such file (was the study interrupted? run it again with --resume)") -> str:

@@ -12,7 +12,7 @@ import jinja2
 import matplotlib
 from markupsafe import Markup
 
-from . import (__version__, checks, figures, findings, ladder, stage_efficiency, statistics, strategy_map, style, tables, text,
+from . import (__version__, checks, figures, findings, ladder, sidecars, stage_efficiency, statistics, strategy_map, style, tables, text,
                trade, trade_tables, trade_text, work, writing)
 from .captions import Caption
 from .comparison import Analysis
@@ -44,9 +44,10 @@ def write(analysis: Analysis, out: Path | None = None) -> Written:
     sections: dict[str, list[Embedded]] = {}
     with matplotlib.rc_context(style.RC):
         for number, drawing in enumerate(figures.draw(analysis), start=1):
-            made = style.outputs(drawing.figure)
-            files |= {f"{drawing.name}.{kind}": content for kind, content in made.items()}
-            uri = data_uri("image/png", made["png"]) if drawing.raster else data_uri("image/svg+xml", made["svg"])
+            made = sidecars.files(drawing, analysis.study.records_hash)
+            files |= made
+            kind, suffix = ("image/png", "png") if drawing.raster else ("image/svg+xml", "svg")
+            uri = data_uri(kind, made[f"{drawing.name}.{suffix}"])
             sections.setdefault(drawing.section, []).append(Embedded(drawing.name, number, uri, drawing.caption))
     found = [t for module in (tables, trade_tables, ladder, strategy_map, work, stage_efficiency) for t in module.tables(analysis)]
     for table in found:

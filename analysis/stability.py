@@ -15,7 +15,7 @@ from typing import Any
 import matplotlib
 import pandas as pd
 
-from . import load, style, text, writing
+from . import load, sidecars, style, text, writing
 from .load import InputError
 from .statistics import is_number
 from .tables import Table
@@ -180,7 +180,7 @@ def write(path: Path, folder: Path) -> list[Path]:
     found = envelopes(read(path))
     with matplotlib.rc_context(style.RC):
         drawn = drawing.draw(found)
-        files = {f"{drawn.name}.{kind}": content for kind, content in style.outputs(drawn.figure).items()}
+        files = sidecars.files(drawn)
     made = table(found)
     files |= {f"{made.name}.csv": made.csv(), f"{made.name}.tex": made.tex(),
               f"{made.name}.txt": f"{drawn.caption.plain}\n{drawn.caption.reading}\n"}

@@ -299,10 +299,11 @@ def launch_medians(samples: Samples) -> np.ndarray:
 def between_runs(samples: Samples, base: Samples) -> tuple[Estimate, float]:
     """Ratio of the medians of two runs, samples / base, and the two-sided p of no difference.
 
-    Runs share no blocks and no drift, so nothing is paired. Launches are what repeats: p is Welch's t on the logarithms of
-    their medians, and the interval is the wider of that test's and of the bootstrap over launches, then blocks, which
-    alone is too narrow for few launches. With one launch on either side the samples have to stand for launches, which
-    they cannot (another launch has another memory layout): p is Mann-Whitney's and the note says so.
+    Runs share no blocks and no drift, so nothing is paired. The samples must differ by the rank test, and the launches,
+    which are what repeats, by Welch's t on the logarithms of their medians: p is the larger one. The interval is the wider
+    of that t's and of the bootstrap over launches, then blocks, which alone is too narrow for few launches. With one
+    launch on either side the samples would have to stand for launches, which they cannot (another launch has another
+    memory layout): p is the rank test's and the note says so.
     """
     value = float(np.median(samples.values) / np.median(base.values))
     n = min(samples.n, base.n)
@@ -310,8 +311,8 @@ def between_runs(samples: Samples, base: Samples) -> tuple[Estimate, float]:
         return Estimate(value, None, None, n, "none", f"fewer than {MIN_SAMPLES} samples"), 1.0
     above, below = _resampled_medians(samples.by_launch()), _resampled_medians(base.by_launch(), SEED + 1)
     low, high = _quantiles(above / below)
+    p = float(stats.mannwhitneyu(samples.values, base.values, alternative="two-sided").pvalue)
     if min(samples.launch_count, base.launch_count) < 2:
-        p = float(stats.mannwhitneyu(samples.values, base.values, alternative="two-sided").pvalue)
         return Estimate(value, low, high, n, "bootstrap over blocks", ONE_LAUNCH), p
     a, b = launch_medians(samples), launch_medians(base)
     # Welch (1947): the degrees of freedom of Satterthwaite.
@@ -319,10 +320,10 @@ def between_runs(samples: Samples, base: Samples) -> tuple[Estimate, float]:
     error = math.sqrt(sum(variances))
     shift = float(a.mean() - b.mean())
     if error == 0:
-        return Estimate(value, low, high, n, "bootstrap over launches, then blocks"), 0.0 if shift else 1.0
+        return Estimate(value, low, high, n, "bootstrap over launches, then blocks"), p if shift else 1.0
     freedom = error**4 / (variances[0] ** 2 / (len(a) - 1) + variances[1] ** 2 / (len(b) - 1))
     half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, freedom)) * error
-    p = float(2 * stats.t.sf(abs(shift) / error, freedom))
+    p = max(p, float(2 * stats.t.sf(abs(shift) / error, freedom)))
     return Estimate(value, min(low, math.exp(shift - half)), max(high, math.exp(shift + half)), n,
                     "Welch t over launches, or bootstrap where wider"), p
 

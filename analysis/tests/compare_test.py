@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from .. import __main__ as program
-from .. import compare, statistics
+from .. import compare, comparison_output, statistics
 from . import synthetic
 from .conftest import FEW
 
@@ -59,6 +59,7 @@ def test_planted_differences_are_found(tmp_path):
     assert others and not {row.verdict for row in others} & {"SLOWER", "FASTER"}
     assert outcome.rows[0].ratio.value == max(row.ratio.value for row in outcome.rows)
     assert outcome.status == 1
+    assert compare.compare(outcome.b, outcome.a).rows[0].verdict == "SLOWER"  # the other way round
 
 
 def test_equal_runs_rarely_differ(tmp_path):
@@ -87,7 +88,7 @@ def test_quiet_equal_runs_are_the_same(tmp_path):
     rows, outcome = verdicts(tmp_path / "a", slow, margin=0.005)
     assert {row.verdict for row in rows.values()} == {"SLOWER"}
     assert compare.common_shift(outcome) == pytest.approx(1.01, abs=0.003)
-    assert "every point moved" in compare.plain(outcome)
+    assert "every point moved" in comparison_output.plain(outcome)
 
 
 def test_wide_intervals_are_ambiguous(tmp_path):
@@ -98,7 +99,7 @@ def test_wide_intervals_are_ambiguous(tmp_path):
 def test_one_launch_is_ambiguous_unless_allowed(tmp_path):
     a, b = run(tmp_path / "a", 1, launches=1, blocks=12), run(tmp_path / "b", 2, launches=1, blocks=12, edit=times(1.5, "/"))
     rows, outcome = verdicts(a, b)
-    assert {row.verdict for row in rows.values()} == {"AMBIGUOUS"} and "one launch" in compare.plain(outcome)
+    assert {row.verdict for row in rows.values()} == {"AMBIGUOUS"} and "one launch" in comparison_output.plain(outcome)
     rows, _ = verdicts(a, b, one_launch=True)
     assert {row.verdict for row in rows.values()} == {"SLOWER"}
 
@@ -137,7 +138,8 @@ def test_another_context_is_refused(tmp_path, capsys, key, change):
     rewrite_context(b, change)
     assert program.main(["compare", str(a), str(b)]) == 2
     out, err = capsys.readouterr()
-    assert out == "" and err.count("\n") == 1 and key in err and str(b) in err and "--ignore" in err
+    assert out == "" and err.count("\n") == 2  # one line the difference, one what to do
+    assert key in err and str(b) in err and "--ignore" in err
     for name in (key, key.split(".")[0]):
         assert program.main(["compare", str(a), str(b), "--ignore", name]) == 0
         assert key in capsys.readouterr().out  # what was allowed is said
@@ -171,12 +173,13 @@ def test_lost_points_fail(tmp_path, capsys):
 
     a, b = run(tmp_path / "a", 1), run(tmp_path / "b", 1, edit=lose)
     rows, outcome = verdicts(a, b)
-    assert sum(row.verdict == "LOST" for row in rows.values()) == 2 and outcome.status == 1
-    assert "does not conform" in compare.plain(outcome)
+    assert sum(row.verdict == "LOST" for row in rows.values()) == 2 and outcome.status == 3
+    assert "does not conform" in comparison_output.plain(outcome)
     # Points that B never planned may be missing; one that failed may not.
     rows, outcome = verdicts(a, b, ignore=["points"])
-    assert [row.why for row in rows.values() if row.verdict == "LOST"] == ["failed: does not conform"] and outcome.status == 1
-    assert verdicts(b, a)[1].only_b
+    assert [row.why for row in rows.values() if row.verdict == "LOST"] == ["failed: does not conform"] and outcome.status == 3
+    assert len(outcome.only_a) == 1 and outcome.only_a[0] in comparison_output.plain(outcome)
+    assert len(verdicts(b, a)[1].only_b) == 2
 
 
 def google(path, scale, n=12, host="node_1", seed=1, edit=None):
@@ -200,7 +203,7 @@ def test_google_benchmark_files(tmp_path, capsys):
     rows, outcome = verdicts(a, b, one_launch=True)
     assert {row.verdict for row in rows.values()} == {"SLOWER"}
     assert np.median(rows["one"].a.values) == pytest.approx(0.1, rel=0.01)  # microseconds; the aggregate is not a sample
-    assert "records little" in compare.plain(outcome)
+    assert "records little" in comparison_output.plain(outcome)
     assert program.main(["compare", str(a), str(google(tmp_path / "c.json", 1, host="elsewhere"))]) == 2
     assert "machine.hostname" in capsys.readouterr().err
 
@@ -237,19 +240,41 @@ def test_a_benchmark_that_failed_is_lost(tmp_path):
             {"name": "two", "run_name": "two", "run_type": "iteration", "error_occurred": True, "error_message": "no memory"}]
 
     rows, outcome = verdicts(google(tmp_path / "a.json", 1), google(tmp_path / "b.json", 1, edit=fail))
-    assert rows["two"].verdict == "LOST" and rows["two"].why == "no memory" and outcome.status == 1
+    assert rows["two"].verdict == "LOST" and rows["two"].why == "no memory" and outcome.status == 3
 
 
-def test_csv_and_usage(tmp_path, capsys):
-    a = run(tmp_path / "a", 1)
-    assert program.main(["compare", str(a), str(a), "--csv", str(tmp_path / "rows.csv")]) == 0
-    with (tmp_path / "rows.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    assert len(rows) == 14 and {float(row["b_over_a"]) for row in rows} == {1.0}
-    for bad in (["compare", str(a)], ["compare", str(a), str(a), "--margin", "2"], ["compare", str(a), str(tmp_path / "none")]):
-        try:
-            status = program.main(bad)
-        except SystemExit as error:
-            status = error.code
-        assert status == 2
+def test_every_difference_is_named(tmp_path, capsys):
+    a, b = run(tmp_path / "a", 1), run(tmp_path / "b", 1)
+    rewrite_context(b, lambda c: (c["program"].update(commit="x", flags="-O2"), c["machine"].update(kernel="5.10")))
+    assert program.main(["compare", str(a), str(b), "--ignore", "program"]) == 2
+    assert capsys.readouterr().err.count("machine.kernel") == 1
+    assert program.main(["compare", str(a), str(b)]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.split(": ")[2] for line in lines[:-1]] == ["machine.kernel", "program.commit", "program.flags"]
+
+
+def test_written_files(tmp_path, capsys):
+    a, b = run(tmp_path / "a", 1), run(tmp_path / "b", 2, edit=times(1.3, "row_parallel"))
+    assert program.main(["compare", str(a), str(b), "--out", str(tmp_path / "out")]) == 1
     capsys.readouterr()
+    assert program.main(["compare", str(a), str(b), "--json"]) == 1
+    value = json.loads(capsys.readouterr().out)
+    assert value == json.loads((tmp_path / "out/comparison.json").read_text()) | {"b": value["b"], "a": value["a"]}
+    with (tmp_path / "out/comparison.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["verdict"] for row in rows] == [point["verdict"] for point in value["points"]] and len(rows) == 14
+    slower = [row for row in rows if row["verdict"] == "SLOWER"]
+    assert len(slower) == 7 and all(float(row["low"]) < 1.3 < float(row["high"]) and float(row["p_holm"]) < 0.05 for row in slower)
+    assert {"ratios.svg", "ratios.pdf", "ratios.png", "ratios.json", "comparison.tex"} <= {p.name for p in (tmp_path / "out").iterdir()}
+
+
+@pytest.mark.parametrize("arguments", [["{a}"], ["{a}", "{a}", "--margin", "2"], ["{a}", "{a}", "--margin", "x"], ["{a}", "{a}/none"],
+                                       ["{a}", "{a}", "--out", "{a}/context.json"]])
+def test_usage(tmp_path, capsys, arguments):
+    a = run(tmp_path / "a", 1)
+    try:
+        status = program.main(["compare", *(argument.format(a=a) for argument in arguments)])
+    except SystemExit as error:
+        status = error.code
+    out, err = capsys.readouterr()
+    assert status == 2 and err.count("\n") == 1

@@ -1,0 +1,171 @@
+"""What a comparison of two runs is written as: text, table, figure, JSON."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+import pandas as pd
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from . import contexts, sidecars, statistics, style, text, writing
+from .captions import Caption, Facts
+from .compare import AMBIGUOUS, FASTER, LOST, SAME, SLOWER, VERDICTS, Outcome, Row, Run, common_shift
+from .figures import common
+from .tables import Table
+
+# Colour, marker and filling, so that a verdict can be read in grey, too.
+LOOKS = {FASTER: (style.COLOURS[0], "<", True), SLOWER: (style.COLOURS[1], ">", True), SAME: (style.COLOURS[6], "o", True),
+         AMBIGUOUS: (style.COLOURS[7], "D", False)}
+MEANING = {FASTER: "B is faster", SLOWER: "B is slower", SAME: "the same within the margin", AMBIGUOUS: "ambiguous"}
+
+
+def plain(outcome: Outcome) -> str:
+    """Every point, the slowest change first, then the counts and what else a reader has to know."""
+    lines = [f"A {outcome.a.path}", f"B {outcome.b.path}", "",
+             f"{'verdict':<10} {'time B / A':<22} {'P(B>A)':>6} {'A':>10} {'B':>10}  point"]
+    for row in outcome.rows:
+        a, b = (f"{text.number(_median(s))} ms" if s is not None else "" for s in (row.a, row.b))
+        if row.ratio is None:
+            lines.append(f"{row.verdict:<10} {text.MISSING:<22} {text.MISSING:>6} {a:>10} {b:>10}  {row.name} ({row.why})")
+            continue
+        quotient = text.estimate(row.ratio.value, row.ratio.low, row.ratio.high)
+        lines.append(f"{row.verdict:<10} {quotient:<22} {row.superiority:>6.2f} {a:>10} {b:>10}  {row.name}")
+    return "\n".join([*lines, "", *remarks(outcome)])
+
+
+def remarks(outcome: Outcome) -> list[str]:
+    counts = Counter(row.verdict for row in outcome.rows)
+    lines = [", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS if counts[verdict])
+             + f" of {text.count(len(outcome.rows), 'point')}. SAME: within {text.percent(outcome.margin)}. Brackets: 95 % intervals"
+             " of the ratio of medians. P(B>A): chance that a sample of B takes longer than one of A."]
+    whys = Counter(row.why for row in outcome.rows if row.verdict == AMBIGUOUS)
+    lines += [f"Ambiguous: {text.count(many, 'point')}, {why}." for why, many in whys.most_common()]
+    shift = common_shift(outcome)
+    if shift is not None:
+        lines.append(f"Nearly every point moved to the same side, by {text.percent(abs(shift - 1))} in the median: a machine that"
+                     " changed between the runs looks like this, too; repeat A before you blame B.")
+    if outcome.only_b:
+        lines.append(f"Only in B: {text.listing(outcome.only_b, 1000)}.")
+    if outcome.only_a:
+        lines.append(f"Only in A, as allowed by --ignore: {text.listing(outcome.only_a, 1000)}.")
+    lines += [f"Differs, as allowed by --ignore: {d.key}: {d.words}." for d in outcome.ignored]
+    if not (outcome.a.complete and outcome.b.complete):
+        lines.append("Google Benchmark's JSON records little of the set-up: only host and CPUs were compared.")
+    return lines
+
+
+def _median(samples: statistics.Samples) -> float:
+    return float(np.median(samples.values))
+
+
+def table(outcome: Outcome) -> Table:
+    numbers, words = [], []
+    for row in outcome.rows:
+        ratio = row.ratio
+        a, b = _median(row.a), None if row.b is None else _median(row.b)
+        numbers.append({"verdict": row.verdict, "point": row.name, "a_ms": a, "b_ms": b, "b_over_a": ratio.value if ratio else None,
+                        "low": ratio.low if ratio else None, "high": ratio.high if ratio else None,
+                        "p_holm": row.p if ratio else None, "superiority": row.superiority if ratio else None,
+                        "n_a": row.a.n, "n_b": row.b.n if row.b is not None else 0, "why": row.why})
+        words.append({"point": row.name, "A (ms)": text.number(a), "B (ms)": text.number(b),
+                      "time B / A": text.estimate(ratio.value, ratio.low, ratio.high) if ratio else text.MISSING,
+                      "verdict": row.verdict})
+    return Table("comparison", "Two runs, point by point", " ".join(remarks(outcome)), pd.DataFrame(numbers), pd.DataFrame(words))
+
+
+def as_json(outcome: Outcome) -> str:
+    def run(r: Run) -> dict[str, Any]:
+        return {"path": str(r.path), "context": r.context.get("id")}
+
+    def difference(d: contexts.Difference) -> dict[str, Any]:
+        return {key: value for key, value in asdict(d).items() if value != ""}
+
+    points = [{key: None if isinstance(value, float) and np.isnan(value) else value for key, value in entry.items()}
+              for entry in table(outcome).numbers.astype(object).to_dict("records")]
+    return json.dumps({"a": run(outcome.a), "b": run(outcome.b), "margin": outcome.margin, "status": outcome.status,
+                       "points": points, "only_a": outcome.only_a, "only_b": outcome.only_b,
+                       "ignored": [difference(d) for d in outcome.ignored], "remarks": remarks(outcome)}, indent=1)
+
+
+def drawings(outcome: Outcome) -> list[common.Drawing]:
+    """The ratio of every point with its interval, in the order of the text; as many figures as hold them."""
+    rows = [row for row in outcome.rows if row.ratio is not None]
+    if not rows:
+        return []
+    limits = _limits(rows, outcome.margin)
+    pages = [rows[i:i + common.MAX_ROWS] for i in range(0, len(rows), common.MAX_ROWS)]
+    return [common.Drawing(common.named("ratios", page, len(pages)), "Comparison",
+                           _figure(outcome, shown, limits, common.part(page, len(pages))),
+                           _caption(outcome, shown, common.part(page, len(pages)))) for page, shown in enumerate(pages)]
+
+
+def _limits(rows: list[Row], margin: float) -> tuple[float, float]:
+    ends = [end for row in rows for end in (row.ratio.low, row.ratio.high, row.ratio.value) if end is not None]
+    low, high = min([*ends, 1 / (1 + margin)]), max([*ends, 1 + margin])
+    room = 0.06 * (high - low)
+    return low - min(room, low / 2), high + room
+
+
+def _figure(outcome: Outcome, rows: list[Row], limits: tuple[float, float], suffix: str) -> matplotlib.figure.Figure:
+    seen = [verdict for verdict in (SLOWER, FASTER, AMBIGUOUS, SAME) if any(row.verdict == verdict for row in outcome.rows)]
+    keys = [_mark(verdict, label=MEANING[verdict]) for verdict in seen]
+    keys.append(Patch(color=style.BAND, ec="#BBBBBB", lw=0.5, label=f"margin, {text.percent(outcome.margin)}"))
+    log = limits[1] / limits[0] > 3
+    block = common.Block("", [common.Row(text.shorten(row.name, 70)) for row in rows])
+    frame = common.row_frame([block], f"Time of B over time of A{suffix}", "time B / time A (1: no difference; left is faster)",
+                             limits=limits, log=log, keys=keys)
+    for patch in list(frame.axes.patches):
+        patch.remove()  # the band of a kernel's rows: there is one block, and the margin is the band here
+    if log:
+        frame.axes.set_xlim(limits)
+    else:
+        frame.axes.set_xlim(*limits)
+    frame.axes.axvspan(1 / (1 + outcome.margin), 1 + outcome.margin, fc=style.BAND, ec="#BBBBBB", lw=0.5, zorder=0)
+    frame.axes.axvline(1, color="black", lw=0.8, ls=(0, (4, 2)), zorder=1)
+    for (y, _), row in zip(frame.rows, rows):
+        colour = LOOKS[row.verdict][0]
+        if row.ratio.has_interval:
+            frame.axes.plot([row.ratio.low, row.ratio.high], [y, y], color=colour, lw=1.4, solid_capstyle="butt", zorder=3)
+        mark = _mark(row.verdict)
+        mark.set_data([row.ratio.value], [y])
+        mark.set_zorder(4)
+        frame.axes.add_line(mark)
+    return frame.figure
+
+
+def _mark(verdict: str, **options: str) -> Line2D:
+    colour, marker, filled = LOOKS[verdict]
+    return Line2D([], [], color=colour, marker=marker, mfc=colour if filled else "white", mec=colour, mew=1.0, ms=5, lw=0, **options)
+
+
+def _caption(outcome: Outcome, rows: list[Row], suffix: str) -> Caption:
+    kinds = sorted({row.ratio.kind for row in rows if row.ratio.has_interval})
+    counts = [s.n for row in rows for s in (row.a, row.b)]
+    launches = sorted({s.launch_count for row in rows for s in (row.a, row.b)})
+    base = f"Base: A, {outcome.a.path.name}, whose medians are in the table; B is {outcome.b.path.name}."
+    machine = outcome.a.context.get("machine", {})
+    name = machine.get("cpu") or machine.get("hostname") or "not recorded"
+    return Caption(f"Two runs, point by point{suffix}",
+                   f"Points are ratios of medians with 95 % intervals ({' / '.join(kinds) or 'none'}), {text.span(counts)} samples a"
+                   f" point and run. {base} {' / '.join(map(str, launches))} launches. Machine: {name}.",
+                   "Filled triangles point to the side that a point moved to; hollow diamonds were not decided; the band is the"
+                   " margin.", Facts("ratios of medians", " / ".join(kinds) or None, base, (min(counts), max(counts)),
+                                     (launches[0], launches[-1]), str(name)))
+
+
+def write(outcome: Outcome, folder: Path) -> list[Path]:
+    """comparison.{csv,tex,json} and ratios.{svg,pdf,png,json}."""
+    made = table(outcome)
+    files: dict[str, str | bytes] = {"comparison.csv": made.csv(), "comparison.tex": made.tex(), "comparison.json": as_json(outcome) + "\n"}
+    with matplotlib.rc_context(style.RC):
+        for drawing in drawings(outcome):
+            files |= sidecars.files(drawing)
+    writing.write_folder(folder, files)
+    return [folder / name for name in files]
