@@ -1,4 +1,4 @@
-"""Command line: python3 -m analysis report DIR, table DIR, speed DIR, compare DIR_A DIR_B, stability FILE."""
+"""Command line: python3 -m analysis report DIR, table DIR, speed DIR, compare DIR_A DIR_B, lint DIR, stability FILE."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def share(words: str) -> float:
 
 def parser() -> Parser:
     main = Parser(prog="python3 -m analysis", description="Turns the records of a study into figures, tables and a report.",
-                  epilog="Exit codes: 0 done, 1 compare found a slower point, 2 bad input or usage (one line on stderr), 3 compare"
+                  epilog="Exit codes: 0 done, 1 compare found a slower point or lint a broken rule, 2 bad input or usage (one line on stderr), 3 compare"
                          " found a point that only A has, or that failed in B.")
     main.add_argument("--version", action="version", version=f"rasterbench analysis {__version__}")
     commands = main.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=Parser)
@@ -41,7 +41,11 @@ def parser() -> Parser:
                                 description="Prints for each picture how many times faster than the peer the kernel is and how many times"
                                             " the floor it takes, with 95 %% intervals, and whether that is the goal of its class"
                                             " (studies/speed.toml). Writes DIR/speed.csv and DIR/speed.tex.")
-    for command in (report, table, speed):
+    lint = commands.add_parser("lint", help="say which rules of measuring a study and its figures keep or break",
+                               description="Names each rule, whether the folder keeps it, what breaks it (file, point) and what to do."
+                                           " Exit codes: 0 nothing forbids publishing, 1 a rule is broken, 2 bad input.")
+    lint.add_argument("--json", action="store_true", help="print JSON, with every finding")
+    for command in (report, table, speed, lint):
         command.add_argument("directory", metavar="DIR", type=Path,
                              help="folder of a study, with context.json and records.jsonl (see harness/records.md)")
     compare = commands.add_parser("compare", help="compare two runs, point by point",
@@ -101,6 +105,12 @@ def main(arguments: list[str] | None = None) -> int:
 
             print(tables.plain(Analysis(study)))
             return 0
+        if options.command == "lint":
+            from . import lint
+
+            result = lint.lint(Analysis(study))
+            print(lint.as_json(result) if options.json else lint.plain(result))
+            return result.status
         if options.command == "speed":
             from . import speed
 

@@ -13,6 +13,7 @@ from .load import Record
 
 NOT_PUBLISHABLE = "not publishable"
 NOTE = "note"
+P95_SAMPLES = 59  # with fewer, the 95th percentile of a sample says nothing with 95 % confidence
 NEEDED = {"program": ("commit", "compiler", "flags"), "machine": ("cpu", "cpus_allowed", "caches", "governor", "smt", "numa_nodes")}
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from dataclasses import asdict
+from os.path import commonprefix
 from pathlib import Path
 from typing import Any
 
@@ -118,7 +119,8 @@ def _figure(outcome: Outcome, rows: list[Row], limits: tuple[float, float], suff
     keys = [_mark(verdict, label=MEANING[verdict]) for verdict in seen]
     keys.append(Patch(color=style.BAND, ec="#BBBBBB", lw=0.5, label=f"margin, {text.percent(outcome.margin)}"))
     log = limits[1] / limits[0] > 3
-    block = common.Block("", [common.Row(text.shorten(row.name, 70)) for row in rows])
+    shared = _shared([row.name for row in rows])
+    block = common.Block(shared.rstrip("/"), [common.Row(text.shorten(row.name[len(shared):], 70)) for row in rows])
     frame = common.row_frame([block], f"Time of B over time of A{suffix}", "time B / time A (1: no difference; left is faster)",
                              limits=limits, log=log, keys=keys)
     for patch in list(frame.axes.patches):
@@ -138,6 +140,12 @@ def _figure(outcome: Outcome, rows: list[Row], limits: tuple[float, float], suff
         mark.set_zorder(4)
         frame.axes.add_line(mark)
     return frame.figure
+
+
+def _shared(names: list[str]) -> str:
+    """What all names begin with, up to a slash: said once, it leaves room for the intervals."""
+    prefix = commonprefix([name.rpartition("/")[0] + "/" for name in names])
+    return prefix[:prefix.rfind("/") + 1]
 
 
 def _mark(verdict: str, **options: str) -> Line2D:

@@ -12,7 +12,7 @@ import jinja2
 import matplotlib
 from markupsafe import Markup
 
-from . import (__version__, checks, figures, findings, ladder, sidecars, stage_efficiency, statistics, strategy_map, style, tables, text,
+from . import (__version__, checks, figures, findings, ladder, lint, sidecars, stage_efficiency, statistics, strategy_map, style, tables, text,
                trade, trade_tables, trade_text, work, writing)
 from .captions import Caption
 from .comparison import Analysis
@@ -54,7 +54,7 @@ def write(analysis: Analysis, out: Path | None = None) -> Written:
         if table.section:
             sections.setdefault(table.section, [])  # a section may have tables and no figure
     top = findings.top(analysis)
-    html = render(analysis, sections, found, top)
+    html = render(analysis, sections, found, top, lint.lint(analysis, files))
     path = out if out is not None else directory / "report.html"
     captions = "".join(f"Figure {e.number} ({e.name}): {e.caption.plain}\n\n" for es in sections.values() for e in es)
     writing.write_folder(directory / "figures", files | ({"captions.txt": captions.encode()} if captions else {}))
@@ -67,13 +67,15 @@ def data_uri(kind: str, content: bytes) -> str:
     return f"data:{kind};base64,{base64.b64encode(content).decode('ascii')}"
 
 
-def render(analysis: Analysis, sections: dict[str, list[Embedded]], found: list[Table], top: list[Finding]) -> str:
+def render(analysis: Analysis, sections: dict[str, list[Embedded]], found: list[Table], top: list[Finding],
+           rules: lint.Result) -> str:
     environment = jinja2.Environment(loader=jinja2.FileSystemLoader(Path(__file__).parent), autoescape=True,
                                      undefined=jinja2.StrictUndefined, trim_blocks=False)
     study, hidden = analysis.study, small_tables(analysis)
     about = study.context["study"]
     return environment.get_template("report.html.j2").render(
         title=study.name, question=about.get("question") or "", findings=top, warnings=checks.check(analysis),
+        rules=rules, rules_summary=lint.summary(rules), merged=lint.merged,
         counts=counts(analysis), run_facts=run_facts(analysis), machine_facts=machine_facts(study.context),
         placed_tables=placed(found, hidden), hidden=len(hidden), section_words={trade.SECTION: trade_text.summary(analysis)},
         section_tables=by_section(found), sections=list(sections.items()), context=recorded(study.context), cell_class=cell_class,

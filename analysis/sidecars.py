@@ -55,8 +55,8 @@ def across_categories(axes: Axes) -> Iterator[str]:
     for line in axes.get_lines():
         if line.get_linestyle() in ("None", "none", " ", "") or line.get_linewidth() == 0 or line.get_transform() != axes.transData:
             continue  # markers only, or a reference line that spans the axes
-        for name, axis, values in (("x", axes.xaxis, line.get_xdata()), ("y", axes.yaxis, line.get_ydata())):
-            if _categorical(axis) and len(values) > 1 and np.ptp(np.asarray(values, dtype=float)) > 0.5:
+        for name, axis, values in (("x", axes.xaxis, line.get_xdata(orig=False)), ("y", axes.yaxis, line.get_ydata(orig=False))):
+            if _categorical(axis) and len(values) > 1 and np.ptp(np.asarray(values, dtype=float)) >= 1:  # categories are one apart
                 yield f"{name}: {line.get_label()}"
 
 

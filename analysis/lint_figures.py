@@ -1,0 +1,63 @@
+"""The rules of figures, checked in the files beside them (analysis/sidecars.py)."""
+
+from __future__ import annotations
+
+from typing import Any, Iterator
+
+from . import style
+from .lint import GRAVE, NOTE, Finding, Folder
+
+SMALLEST_TEXT = 5.5  # points, at the width of a page
+RATIOS = ("speedup", "efficiency")
+
+
+def caption(folder: Folder) -> Iterator[Finding]:
+    for file, figure in folder.figures:
+        facts = figure.get("facts")
+        if not isinstance(facts, dict):
+            yield Finding(GRAVE, file, _name(figure), "says nothing of its data", "give its caption the facts (captions.Facts)")
+            continue
+        if not facts.get("machine") or str(facts["machine"]).startswith("unknown"):
+            yield Finding(GRAVE, file, _name(figure), "does not name the machine", "record machine.cpu")
+        if facts.get("estimates") and not facts.get("samples"):
+            yield Finding(GRAVE, file, _name(figure), "does not say how many samples its points have", "build the caption from the records")
+        if facts.get("estimates") and not facts.get("interval"):
+            yield Finding(NOTE, file, _name(figure), "shows estimates without intervals", "take at least 6 samples a point")
+
+
+def base(folder: Folder) -> Iterator[Finding]:
+    for file, figure in folder.figures:
+        ratio = next((w for w in RATIOS if any(w in str(label).lower() for label in figure.get("axes") or ())), None)
+        if ratio and not (figure.get("facts") or {}).get("base"):
+            yield Finding(GRAVE, file, _name(figure), f"an axis of {ratio} and no base in the caption", "name the base and its seconds")
+
+
+def lines(folder: Folder) -> Iterator[Finding]:
+    for file, figure in folder.figures:
+        for line in figure.get("lines_across_categories") or ():
+            yield Finding(GRAVE, file, _name(figure), f"a line joins categories ({line})", "draw points: there is nothing between kernels")
+
+
+def legible(folder: Folder) -> Iterator[Finding]:
+    for file, figure in folder.figures:
+        smallest, size = figure.get("smallest_text_pt"), figure.get("size_inches") or [0, 0]
+        if smallest is not None and smallest < SMALLEST_TEXT:
+            yield Finding(NOTE, file, _name(figure), f"text of {smallest:g} points", f"use at least {SMALLEST_TEXT:g}")
+        if size[0] > style.FULL_WIDTH + 0.01 or size[1] > style.MAX_HEIGHT + 0.8:
+            yield Finding(NOTE, file, _name(figure), f"{size[0]:g} x {size[1]:g} inches: larger than a page", "divide it")
+
+
+def grey(folder: Folder) -> Iterator[Finding]:
+    for file, figure in folder.figures:
+        for a, b in figure.get("alike_in_grey") or ():
+            yield Finding(NOTE, file, _name(figure), f"{a!r} and {b!r} differ in colour only", "give them markers, dashes or hatches")
+
+
+def current(folder: Folder) -> Iterator[Finding]:
+    for file, figure in folder.figures:
+        if figure.get("records") != folder.study.records_hash:
+            yield Finding(GRAVE, file, _name(figure), "was drawn from other records than those here", "run `python3 -m analysis report`")
+
+
+def _name(figure: dict[str, Any]) -> str:
+    return str(figure.get("title") or figure.get("name") or "a figure")

@@ -1,0 +1,286 @@
+"""The rules of measuring (Hoefler & Belli, SC'15, and what users of other suites asked for), each as a function that finds what
+breaks it in the files of a study. analysis/lint.py runs them."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from typing import Any, Iterator
+
+import numpy as np
+from scipy import stats
+
+from . import checks, lint_figures, statistics, text
+from .figures.balance import busy
+from .lint import GRAVE, NOTE, Finding, Folder, Rule
+from .load import Record
+from .statistics import is_number
+
+DRIFT_P = 1e-3  # of Spearman's rank correlation between time and order
+OUTLIER = 3.0  # times the median
+STAGE_ROUNDING = 1e-3  # of a sample, by which its stages may exceed it
+
+
+def base_case(folder: Folder) -> Iterator[Finding]:
+    analysis = folder.analysis
+    for record in folder.study.timed:
+        if record.config.backend == "serial":
+            continue
+        bases = {"(a), a serial kernel with equal picture, numeric mode and instruction set": analysis.serial_base[record.id],
+                 "(b), the same point on one thread": analysis.thread_base[record.id]}
+        for name, base in bases.items():
+            if base is None:
+                yield folder.record(record, NOTE, f"no base {name}", "add it to the sweep: without it no speedup is shown")
+            elif base is not record and (speedup := analysis.speedup(record, base)) and speedup.note:
+                yield folder.record(record, GRAVE, f"base {name}: {speedup.note}", "measure the base in every block of the point")
+
+
+def two_verdicts(folder: Folder) -> Iterator[Finding]:
+    for record in folder.study.every_record:
+        raw = record.raw
+        if raw.get("status") == "ok" and not record.ok:
+            yield folder.record(record, GRAVE, f"status ok, but {record.reason}", "verify it; such a point shows no speed")
+        if raw.get("status") != "ok" and raw.get("samples_ms"):
+            yield folder.record(record, GRAVE, f"status {raw['status']} with times", "run it again: what failed has no times")
+        if record.ok and not record.config.is_peer and not any(record.verify.get(k) for k in ("oracle", "end_to_end", "embree")):
+            yield folder.record(record, NOTE, "no verdict on accuracy", "verify against the oracle, or say that nobody judged it")
+        oracle, bound = record.verify.get("oracle") or {}, record.verify.get("bound") or {}
+        if record.ok and bound.get("bounded") and oracle.get("within_bound") is False:
+            yield folder.record(record, GRAVE, "the picture is outside the bound of its mode, and has times",
+                                "find the pixels with `rasterbench verify --difference`; the bound or the kernel is wrong")
+
+
+def subsets(folder: Folder) -> Iterator[Finding]:
+    counts, records = folder.study.context["points"], folder.study.every_record
+    found = {"planned": len(records)} | {key: sum(r.raw.get("status") == status for r in records)
+                                         for key, status in (("run", "ok"), ("skipped", "skipped"), ("failed", "failed"))}
+    for key, many in found.items():
+        if counts.get(key) is None:
+            yield folder.context(f"points.{key}", GRAVE, "not recorded", "run the study again, or say how many points were left out")
+        # `run` of a study that failed points ran, too, counts them in some versions
+        elif counts[key] != many and not (key == "run" and counts[key] == many + found["failed"]):
+            yield folder.context(f"points.{key}", GRAVE, f"{counts[key]}, the records hold {many}",
+                                 "keep every record of a study: leaving points out selects")
+    for record in folder.study.every_record:
+        if record.status != "ok" and not record.raw.get("reason") and not record.reason:
+            yield folder.record(record, GRAVE, f"{record.status} without a reason", "record why")
+
+
+def means(folder: Folder) -> Iterator[Finding]:
+    for record in folder.timed:
+        median = float(np.median(record.samples.values))
+        if record.recorded_median is None:
+            yield folder.record(record, NOTE, "no median recorded", "write the median beside the samples")
+        elif not math.isclose(record.recorded_median, median, rel_tol=1e-4, abs_tol=1e-6):
+            kind = "their mean" if math.isclose(record.recorded_median, float(np.mean(record.samples.values)), rel_tol=1e-6) else "not theirs"
+            yield folder.record(record, GRAVE, f"median_ms {record.recorded_median:g}, the samples give {median:g} ({kind})",
+                                "compute it from the samples")
+
+
+def determinism(folder: Folder) -> Iterator[Finding]:
+    pictures: dict[tuple, tuple[int, Record]] = {}
+    for record in folder.study.timed:
+        if record.verify.get("differing_pixels"):
+            yield folder.record(record, GRAVE, f"{record.verify['differing_pixels']} pixels differ from the scalar specification",
+                                "make the kernel equal it bit for bit")
+        covered, c = record.work.get("covered_pixels"), record.config
+        if covered is None:
+            continue
+        key = (c.scene, c.scene_hash, c.size, c.numeric, c.fill, c.near, c.isa)
+        first = pictures.setdefault(key, (covered, record))
+        if covered != first[0]:
+            yield folder.record(record, GRAVE, f"covers {covered} pixels, {first[1].name} {first[0]}: the same mode drew two pictures",
+                                "find the kernel that depends on its schedule, threads or tiles")
+
+
+def confidence(folder: Folder) -> Iterator[Finding]:
+    for record in folder.timed:
+        samples, raw = record.samples, record.raw
+        if samples.launch_count < statistics.MIN_LAUNCHES:
+            yield folder.record(record, GRAVE, text.count(samples.launch_count, "launch", "launches"),
+                                f"set sampling.launches to {statistics.MIN_LAUNCHES} or more: one process has one memory layout")
+        if samples.n < statistics.MIN_SAMPLES:
+            yield folder.record(record, GRAVE, text.count(samples.n, "sample"), "set sampling.min_samples to 6 or more: fewer have no"
+                                " interval")
+        bounds = statistics.order_interval(samples.values)
+        stored = record.recorded_interval
+        if (bounds is None) != (stored is None) or bounds and not all(map(_close, bounds, stored)):
+            yield folder.record(record, GRAVE, f"interval_ms {stored}, the samples give {bounds}", "compute it from the samples")
+        if samples.n < checks.P95_SAMPLES and raw.get("p95_ms") is not None:
+            yield folder.record(record, GRAVE, f"a 95th percentile of {text.count(samples.n, 'sample')}",
+                                f"show none below {checks.P95_SAMPLES}: the largest sample is no percentile")
+
+
+def stopping(folder: Folder) -> Iterator[Finding]:
+    for record in folder.timed:
+        bounds = statistics.order_interval(record.samples.values)
+        if not record.stop:
+            yield folder.record(record, GRAVE, "no reason for its last sample", "record why sampling stopped")
+        elif record.stop == "target" and (not bounds or (bounds[1] - bounds[0]) / 2 >
+                                          folder.study.target * float(np.median(record.samples.values)) * (1 + 1e-9)):
+            yield folder.record(record, GRAVE, f"stopped by target, but its interval is wider than {text.percent(folder.study.target)}",
+                                "sample until the interval is within the target, or record the limit that stopped it")
+        elif record.stop != "target":
+            yield folder.record(record, NOTE, f"stopped by {record.stop}, not by its interval", "raise that limit, or state the interval")
+
+
+def comparison(folder: Folder) -> Iterator[Finding]:
+    for group in folder.analysis.groups:
+        assumed = [c for c in group.comparisons.values() if c.test in (statistics.WELCH, "none") and c.verdict != "best"]
+        if assumed:
+            yield Finding(NOTE, "records.jsonl", group.title, f"too few samples for a rank test in {text.count(len(assumed), 'comparison')}"
+                          " with the fastest", "take more samples or blocks, or compare fewer points")
+
+
+def raw_data(folder: Folder) -> Iterator[Finding]:
+    taken = Counter(event.get("id") for event in folder.journal or () if event.get("event") == "sample")
+    for record in folder.timed:
+        values, raw = record.samples.values, record.raw
+        for key, value in (("min_ms", values.min()), ("max_ms", values.max())):
+            if raw.get(key) is None:
+                yield folder.record(record, NOTE, f"no {key}", "store the extremes: the largest time is a result, too")
+            elif is_number(raw[key]) and not _close(raw[key], float(value)):
+                yield folder.record(record, GRAVE, f"{key} {raw[key]:g}, the samples give {value:g}: samples were dropped",
+                                    "store every sample; label outliers, never drop them")
+        if taken and taken[record.id] != len(values):
+            yield folder.record(record, GRAVE, f"{len(values)} samples, the journal has {taken[record.id]}",
+                                "make records from the whole journal")
+
+
+def order(folder: Folder) -> Iterator[Finding]:
+    for record in folder.timed:
+        pairs = list(zip(record.samples.launches.tolist(), record.samples.blocks.tolist()))
+        if len(set(pairs)) < len(pairs):
+            yield folder.record(record, GRAVE, "several samples in one block", "take every point once per block")
+    blocks: dict[tuple, list[str]] = {}
+    for event in folder.journal or ():
+        if event.get("event") == "sample":
+            blocks.setdefault((event.get("launch"), event.get("block")), []).append(str(event.get("id")))
+    whole = [tuple(ids) for ids in blocks.values() if len(ids) == max(map(len, blocks.values()))]
+    if len(whole) >= 3 and len(whole[0]) >= 4 and len(set(whole)) == 1:
+        yield Finding(GRAVE, "journal.jsonl", "samples", f"the order of the points is the same in all {len(whole)} complete blocks",
+                      "shuffle each block: else drift and caches favour the same points each time")
+
+
+def clock(folder: Folder) -> Iterator[Finding]:
+    if not folder.study.context.get("region"):
+        yield folder.context("region", GRAVE, "not recorded", "say what a sample times: which stages, clears, allocation")
+    for record in folder.timed:
+        if not is_number(record.raw.get("frames_per_sample")):
+            yield folder.record(record, GRAVE, "frames_per_sample is not recorded", "record how many frames a sample is the mean of")
+        stages = [values for values in record.stages.values() if values is not None]
+        if stages and np.any(np.sum(stages, axis=0) > record.samples.values * (1 + STAGE_ROUNDING)):
+            yield folder.record(record, GRAVE, "its stages take longer than its frame", "time them with one clock, within the frame")
+
+
+def set_up(folder: Folder) -> Iterator[Finding]:
+    context = folder.study.context
+    if context["program"].get("dirty") is not False:
+        yield folder.context("program.dirty", GRAVE, "built from a dirty commit" if context["program"].get("dirty") else "not recorded",
+                             "commit, build and run again: nobody else has this source")
+    for part, keys in checks.NEEDED.items():
+        for key in keys:
+            if context[part].get(key) in (None, ""):
+                yield folder.context(f"{part}.{key}", GRAVE, "not recorded", "record it, or \"unavailable: REASON\"")
+    for record in folder.study.every_record:
+        if context.get("id") and record.context not in (None, context["id"]):
+            yield folder.record(record, GRAVE, "recorded under another context than context.json", "never mix machines or builds")
+        if not record.ok:
+            continue
+        if record.threads_observed is None:
+            yield folder.record(record, NOTE, "threads that ran were not observed", "observe them: a binding may leave one worker")
+        elif record.threads_observed < record.config.threads:
+            yield folder.record(record, GRAVE, f"{record.threads_observed} of {text.count(record.config.threads, 'thread')} ran",
+                                "remove what limits them (binding, cgroup), or ask for fewer")
+        if record.config.threads > 1 and str(record.config.binding or "none").lower() in ("none", "false", "off"):
+            yield folder.record(record, NOTE, "its threads were not pinned", "add binding = [\"close\"] to the study")
+        times = busy(record)
+        if times and min(times) < 0.01 * max(times):
+            yield folder.record(record, NOTE, "a thread did next to nothing", "read its time as that of fewer threads")
+
+
+def noise(folder: Folder) -> Iterator[Finding]:
+    machine = folder.study.context["machine"]
+    load, cpus = checks.first_load(machine.get("load_average")), machine.get("cpus_online")
+    if load is None:
+        yield folder.context("machine.load_average", GRAVE, "not recorded", "record it, or \"unavailable: REASON\"")
+    elif load > 0.25 * (cpus if isinstance(cpus, int) and cpus > 0 else 1):
+        yield folder.context("machine.load_average", NOTE, f"{load:g} at the start: something else was running", "run on a quiet machine")
+    for record in folder.timed:
+        values, target = record.samples.values, folder.study.target
+        slow = int(np.sum(values > OUTLIER * np.median(values)))
+        if slow:
+            yield folder.record(record, NOTE, f"{text.count(slow, 'sample')} above {OUTLIER:g} times the median (kept)",
+                                "look at p95 and the largest time; find what disturbed them")
+        if len(values) >= 10 and np.ptp(values) > 0:
+            trend = stats.spearmanr(np.arange(len(values)), values)
+            half = len(values) // 2
+            moved = float(np.median(values[-half:]) / np.median(values[:half])) - 1
+            # Only a shift that matters: a rank correlation finds any.
+            if trend.pvalue < DRIFT_P and abs(moved) > target:
+                yield folder.record(record, NOTE, f"its later samples differ by {100 * moved:+.1f} % from its earlier ones: drift",
+                                    "trust paired ratios, not single times; let the machine settle")
+
+
+def verification(folder: Folder) -> Iterator[Finding]:
+    for record in folder.study.timed:
+        if not record.verify.get("checked_against"):
+            yield folder.record(record, GRAVE, "not said what it was checked against", "verify it against the scalar specification")
+    verified: set[Any] = set()
+    for event in folder.journal or ():
+        if event.get("event") == "verify":
+            verified |= {event.get("id"), *(event.get("ids") or ())}
+        elif event.get("event") == "sample" and event.get("id") not in verified:
+            verified.add(event.get("id"))  # once a point
+            yield Finding(GRAVE, "journal.jsonl", str(event.get("id")), "timed before it was verified", "verify, then time")
+
+
+def bounds(folder: Folder) -> Iterator[Finding]:
+    for record in folder.study.timed:
+        if record.floor_ms is None:
+            yield folder.record(record, NOTE, "no floor", "let the study measure the memory bandwidth")
+        elif folder.analysis.estimates[record.id].value < record.floor_ms:
+            yield folder.record(record, NOTE, "faster than its floor", "measure the bandwidth again: other load disturbed it, or caches"
+                                " held the picture")
+
+
+def crash(folder: Folder) -> Iterator[Finding]:
+    for name in ("records.jsonl", "context.json"):
+        if not (folder.directory / name).read_bytes().endswith(b"\n"):
+            yield Finding(NOTE if name == "context.json" else GRAVE, name, "end", "its last line has no end: it was not written whole",
+                          "make it again from the journal: rasterbench study --resume")
+    known = {record.id for record in folder.study.every_record}
+    lost = sorted({str(event["id"]) for event in folder.journal or () if event.get("event") == "sample" and event.get("id") not in known})
+    for identity in lost:
+        yield Finding(GRAVE, "journal.jsonl", identity, "was sampled and has no record", "make the records from the whole journal")
+
+
+def _close(a: float, b: float) -> bool:
+    return math.isclose(a, b, rel_tol=1e-4, abs_tol=1e-6)
+
+
+RULES = (
+    Rule("base-case", "every speedup has its bases, measured in every block", base_case),
+    Rule("two-verdicts", "what does not conform shows no speed; accuracy is judged beside it", two_verdicts),
+    Rule("subsets", "all planned points are reported, every skip has a reason", subsets),
+    Rule("means", "medians of the samples, no other mean", means),
+    Rule("determinism", "a mode draws the same bits under every kernel, schedule and thread count", determinism),
+    Rule("confidence", "95 % intervals, five launches, p95 from 59 samples", confidence),
+    Rule("stopping", "a point stops by its interval or says which limit stopped it", stopping),
+    Rule("comparison", "differences come from rank tests", comparison),
+    Rule("raw-data", "every sample is stored, outliers included", raw_data),
+    Rule("order", "randomised complete blocks", order),
+    Rule("clock", "the timed region is named, and its parts fit into it", clock),
+    Rule("set-up", "machine, build and observed threads are recorded", set_up),
+    Rule("noise", "load, drift and outliers are labelled", noise),
+    Rule("verification", "checked before it was timed", verification),
+    Rule("bounds", "the measured floor stands beside the times", bounds),
+    Rule("plot-caption", "a figure says n, interval and machine", lint_figures.caption, "figures"),
+    Rule("plot-base", "a figure of speedups names its base", lint_figures.base, "figures"),
+    Rule("plot-lines", "lines join ordered values only, never kernels", lint_figures.lines, "figures"),
+    Rule("plot-legible", "a figure fits a page and its text can be read", lint_figures.legible, "figures"),
+    Rule("plot-grey", "a legend can be told apart without colours", lint_figures.grey, "figures"),
+    Rule("plot-current", "a figure was drawn from these records", lint_figures.current, "figures"),
+    Rule("crash", "records are whole, and hold all of the journal", crash),
+    Rule("exit", "a failed point makes the exit status non-zero", None, why_not="no file holds the exit status; tests/ has it"),
+)

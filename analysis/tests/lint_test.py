@@ -1,0 +1,305 @@
+"""lint: a clean study breaks nothing; each rule is broken by one change, and by that change no other rule is."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from .. import __main__ as program
+from .. import lint, lint_rules, sidecars, style
+from ..captions import Caption
+from ..figures.common import Drawing
+from . import synthetic
+from .conftest import FEW, analyse
+
+IDS = [rule.id for rule in lint_rules.RULES]
+
+
+def floors(records):
+    for entry in records:
+        if entry["status"] == "ok":
+            entry["floor_ms"] = 0.01
+
+
+def write(directory, edit=None, **changes):
+    def both(records):
+        floors(records)
+        if edit:
+            edit(records)
+
+    plan = synthetic.plan(**(dict(kernels=["bounding_box", "tile_parallel"], schedules=FEW[:1], threads=[1, 2], launches=6, blocks=10, noise=0.008,
+                                  scenes={"teapot": synthetic.SCENES["teapot"]}, untimed=False, edit=both) | changes))
+    synthetic.write(directory, plan)
+    rewrite_context(directory, lambda context: None)
+    return directory
+
+
+def rewrite_context(directory, change):
+    path = directory / "context.json"
+    context = json.loads(path.read_text())
+    change(context)
+    path.write_text(json.dumps(context) + "\n")
+
+
+def journal(directory, change=None):
+    """A journal that agrees with the records, its blocks shuffled."""
+    entries = [json.loads(line) for line in (directory / "records.jsonl").read_text().splitlines()]
+    rng = np.random.default_rng(1)
+    events = [{"event": "start"}] + [{"event": "verify", "id": entry["id"]} for entry in entries]
+    for launch in range(6):
+        for block in range(10):
+            events += [{"event": "sample", "launch": launch, "block": block, "id": entries[i]["id"]} for i in rng.permutation(len(entries))]
+    events = change(events, entries) if change else events
+    (directory / "journal.jsonl").write_text("".join(json.dumps(event) + "\n" for event in events))
+
+
+def broken(directory, severity=None):
+    """Rules that something breaks, or with a severity those that it breaks so."""
+    return {v.rule.id for v in lint.lint(analyse(directory)).verdicts for f in v.findings if severity in (None, f.severity)}
+
+
+def test_a_clean_study_breaks_nothing(tmp_path, capsys):
+    directory = write(tmp_path / "a")
+    journal(directory)
+    assert program.main(["report", str(directory)]) == 0
+    capsys.readouterr()
+    assert program.main(["lint", str(directory)]) == 0
+    out = capsys.readouterr().out
+    assert "Nothing here forbids publishing" in out
+    result = lint.lint(analyse(directory))
+    assert result.findings == []
+    assert {v.rule.id for v in result.verdicts if v.words == lint.NOT_VISIBLE} == {"exit"}
+    assert all(rule_id in out for rule_id in IDS) and len(IDS) == len(set(IDS))
+    page = (directory / "report.html").read_text()
+    assert "Rules of measuring" in page and lint.summary(result) in page
+
+
+def drop_serial(records):
+    records[:] = [entry for entry in records if entry["config"]["backend"] != "serial"]
+
+
+def other_blocks(records):
+    for entry in records:
+        if entry["config"]["backend"] == "serial":
+            entry["blocks"] = [block + 100 for block in entry["blocks"]]
+
+
+def slow_stages(entry):
+    entry["stages_ms"]["raster"] = [1.2 * sample for sample in entry["samples_ms"]]
+
+
+def one_block(entry):
+    entry["blocks"][1] = entry["blocks"][0]
+
+
+def outlier(entry):
+    entry["samples_ms"][3] *= 5
+    restate(entry)
+
+
+def drift(entry):
+    n = len(entry["samples_ms"])
+    entry["samples_ms"] = (10 * np.linspace(1, 1.3, n)).tolist()
+    restate(entry)
+    entry["stop"] = "max_samples"
+    entry["stages_ms"] = {stage: None for stage in entry["stages_ms"]}
+
+
+def restate(entry):
+    values = np.array(entry["samples_ms"])
+    bounds = lint_rules.statistics.order_interval(values)
+    entry.update(median_ms=float(np.median(values)), interval_ms=list(bounds), min_ms=float(values.min()), max_ms=float(values.max()),
+                 p95_ms=None)
+
+
+def outside(entry):
+    entry["verify"].update(bound={"bounded": True}, oracle={"within_bound": False})
+
+
+def first(change):
+    """The change made to a parallel point on two threads."""
+    return lambda records: change(next(entry for entry in records if entry["config"]["threads"] == 2))
+
+
+@pytest.mark.parametrize("rule, severity, edit, also", [
+    ("base-case", "note", drop_serial, ()),
+    ("base-case", "grave", other_blocks, ()),
+    ("two-verdicts", "grave", first(lambda r: r["verify"].update(conforms=None)), ()),
+    ("two-verdicts", "grave", first(outside), ()),
+    ("two-verdicts", "note", first(lambda r: r["verify"].update(oracle=None)), ()),
+    ("means", "grave", first(lambda r: r.update(median_ms=1.5 * r["median_ms"])), ()),
+    ("means", "note", first(lambda r: r.pop("median_ms")), ()),
+    ("determinism", "grave", first(lambda r: r["work"].update(covered_pixels=7)), ()),
+    ("determinism", "grave", first(lambda r: r["verify"].update(differing_pixels=7)), ()),
+    ("confidence", "grave", first(lambda r: r.update(interval_ms=[0.1, 0.2])), ()),
+    ("confidence", "grave", first(lambda r: r.update(launches=[0] * 60, blocks=list(range(60)))), ()),
+    ("stopping", "grave", first(lambda r: r.pop("stop")), ()),
+    ("stopping", "note", first(lambda r: r.update(stop="point_seconds")), ()),
+    ("raw-data", "grave", first(lambda r: r.update(max_ms=r["max_ms"] / 2)), ()),
+    ("raw-data", "note", first(lambda r: r.update(min_ms=None)), ()),
+    ("order", "grave", first(one_block), ()),
+    ("clock", "grave", first(lambda r: r.pop("frames_per_sample")), ()),
+    ("clock", "grave", first(slow_stages), ()),
+    ("set-up", "grave", first(lambda r: r.update(threads_observed=1)), ()),
+    ("set-up", "grave", first(lambda r: r.update(context="another")), ()),
+    ("set-up", "note", first(lambda r: r["config"].update(binding="none")), ("base-case",)),
+    ("set-up", "note", first(lambda r: r["per_thread"][1].update(busy_ms=0.0)), ()),
+    ("set-up", "note", first(lambda r: r.update(threads_observed=None)), ()),
+    ("noise", "note", first(outlier), ()),
+    ("noise", "note", first(drift), ("stopping",)),
+    ("verification", "grave", first(lambda r: r["verify"].pop("checked_against")), ()),
+    ("bounds", "note", first(lambda r: r.pop("floor_ms")), ()),
+    ("bounds", "note", first(lambda r: r.update(floor_ms=1e6)), ()),
+])
+def test_one_change_breaks_one_rule(tmp_path, rule, severity, edit, also):
+    directory = write(tmp_path / "a", edit)
+    assert rule in broken(directory, severity)
+    assert broken(directory) == {rule, *also}
+
+
+def test_findings_name_file_point_and_remedy(tmp_path, capsys):
+    directory = write(tmp_path / "a", first(lambda r: r.update(threads_observed=1)))
+    assert program.main(["lint", str(directory), "--json"]) == 1
+    value = json.loads(capsys.readouterr().out)
+    (rule,) = [rule for rule in value["rules"] if rule["verdict"] == "broken"]
+    (finding,) = rule["findings"]
+    assert rule["id"] == "set-up" and finding["file"].startswith("records.jsonl:") and "/2" in finding["place"]
+    assert "1 of 2 threads" in finding["problem"] and finding["remedy"]
+    assert value["status"] == 1 and "set-up" in value["summary"]
+
+
+def test_few_samples(tmp_path):
+    few = write(tmp_path / "a", launches=1, blocks=3)
+    assert {"confidence", "comparison"} <= broken(few)
+    def percentile(entry):
+        entry["p95_ms"] = 9.0
+    assert broken(write(tmp_path / "b", first(percentile), blocks=9)) >= {"confidence"}
+    assert "stopping" in broken(write(tmp_path / "c", noise=0.2), "grave")  # "target", and the interval is far wider
+
+
+@pytest.mark.parametrize("rule, severity, change", [
+    ("subsets", "grave", lambda c: c["points"].update(planned=99)),
+    ("subsets", "grave", lambda c: c["points"].pop("skipped")),
+    ("clock", "grave", lambda c: c.pop("region")),
+    ("set-up", "grave", lambda c: c["program"].update(dirty=True)),
+    ("set-up", "grave", lambda c: c["program"].pop("flags")),
+    ("set-up", "grave", lambda c: c["machine"].update(governor="")),
+    ("noise", "grave", lambda c: c["machine"].pop("load_average")),
+    ("noise", "note", lambda c: c["machine"].update(load_average=[3.5, 1, 1])),
+])
+def test_contexts(tmp_path, rule, severity, change):
+    directory = write(tmp_path / "a")
+    rewrite_context(directory, change)
+    assert broken(directory, severity) == {rule} == broken(directory)
+
+
+@pytest.fixture(scope="module")
+def reported(tmp_path_factory):
+    directory = write(tmp_path_factory.mktemp("reported") / "a")
+    assert program.main(["report", str(directory)]) == 0
+    return directory
+
+
+def unshuffled(events, entries):
+    place = {entry["id"]: i for i, entry in enumerate(entries)}
+    return sorted(events, key=lambda e: (e["event"] == "sample", e.get("launch", 0), e.get("block", 0), place.get(e.get("id"), 0)))
+
+
+@pytest.mark.parametrize("rule, change", [
+    ("raw-data", lambda events, entries: events[:-1]),
+    ("order", unshuffled),
+    ("verification", lambda events, entries: [e for e in events if e.get("id") != entries[3]["id"] or e["event"] != "verify"]),
+    ("crash", lambda events, entries: [*events, {"event": "verify", "id": "lost"}, {"event": "sample", "launch": 0, "block": 0, "id": "lost"}]),
+])
+def test_journals(tmp_path, rule, change):
+    directory = write(tmp_path / "a")
+    assert broken(directory) == set()
+    journal(directory)
+    assert broken(directory) == set()
+    journal(directory, change)
+    assert broken(directory, "grave") == {rule}
+
+
+def test_an_interrupted_line_of_the_journal_is_none(tmp_path):
+    directory = write(tmp_path / "a")
+    journal(directory)
+    with (directory / "journal.jsonl").open("a") as file:
+        file.write('{"event": "sam')
+    assert broken(directory) == set()
+
+
+def test_a_half_written_file(tmp_path):
+    directory = write(tmp_path / "a")
+    path = directory / "records.jsonl"
+    path.write_text(path.read_text().rstrip("\n"))
+    assert broken(directory, "grave") == {"crash"}
+
+
+@pytest.mark.parametrize("rule, change", [
+    ("plot-caption", lambda f: f.update(facts=None)),
+    ("plot-caption", lambda f: f["facts"].update(machine=None)),
+    ("plot-caption", lambda f: f["facts"].update(samples=None)),
+    ("plot-caption", lambda f: f["facts"].update(interval=None)),
+    ("plot-base", lambda f: f["facts"].update(base=None)),
+    ("plot-lines", lambda f: f.update(lines_across_categories=["x: kernels"])),
+    ("plot-legible", lambda f: f.update(smallest_text_pt=4.0)),
+    ("plot-legible", lambda f: f.update(size_inches=[9.0, 3.0])),
+    ("plot-grey", lambda f: f.update(alike_in_grey=[["a", "b"]])),
+    ("plot-current", lambda f: f.update(records="0")),
+])
+def test_figures(tmp_path, reported, rule, change):
+    directory = shutil.copytree(reported, tmp_path / "a")
+    path = next((directory / "figures").glob("scaling_*.json"))
+    figure = json.loads(path.read_text())
+    change(figure)
+    path.write_text(json.dumps(figure))
+    result = lint.lint(analyse(directory))
+    expected = {rule} | ({"plot-base"} if figure["facts"] is None else set())
+    assert {v.rule.id for v in result.verdicts if v.findings} == expected
+    assert {f.file for f in result.findings} == {f"figures/{path.name}"}
+
+
+def drawn(plot):
+    with matplotlib.rc_context(style.RC):
+        figure = Figure(figsize=(3, 2))
+        axes = figure.add_subplot()
+        plot(axes)
+        figure.draw_without_rendering()  # ticks have no labels before
+        return sidecars.describe(Drawing("x", "s", figure, Caption("t", "b", "r")), "")
+
+
+def test_sidecars_see_lines_across_categories():
+    assert drawn(lambda axes: axes.plot(["static", "dynamic", "guided"], [1, 2, 3]))["lines_across_categories"]
+    assert not drawn(lambda axes: axes.plot(["static", "dynamic", "guided"], [1, 2, 3], "o"))["lines_across_categories"]
+    assert not drawn(lambda axes: axes.plot([1, 2, 4], [1, 2, 3]))["lines_across_categories"]
+    assert not drawn(lambda axes: (axes.plot([1, 2], [0, 0]), axes.set_yticks([0, 1], ["static", "guided"])))["lines_across_categories"]
+
+
+def test_sidecars_see_what_is_alike_in_grey():
+    def pair(one, two):
+        return lambda axes: (axes.plot([1, 2], [1, 2], label="a", **one), axes.plot([1, 2], [2, 1], label="b", **two), axes.legend())
+
+    red, green = dict(color="#C00000"), dict(color="#008000")
+    assert drawn(pair(red, green))["alike_in_grey"] == [["a", "b"]]
+    assert drawn(pair(red | dict(marker="o"), green | dict(marker="s")))["alike_in_grey"] == []
+    assert drawn(pair(red, green | dict(ls="--")))["alike_in_grey"] == []
+    assert drawn(pair(red, dict(color="#FFC0C0")))["alike_in_grey"] == []
+
+
+def test_sidecars_see_small_text():
+    assert drawn(lambda axes: axes.text(0, 0, "x", fontsize=3))["smallest_text_pt"] == 3
+    assert drawn(lambda axes: axes.text(0, 0, " ", fontsize=3))["smallest_text_pt"] > 5
+
+
+def test_bad_input(tmp_path, capsys):
+    assert program.main(["lint", str(tmp_path / "none")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    directory = write(tmp_path / "a")
+    (directory / "journal.jsonl").write_text("{\n")
+    assert program.main(["lint", str(directory)]) == 2
+    assert "journal.jsonl:1" in capsys.readouterr().err
