@@ -113,15 +113,22 @@ def confidence(folder: Folder) -> Iterator[Finding]:
 
 def stopping(folder: Folder) -> Iterator[Finding]:
     for record in folder.timed:
-        bounds = statistics.order_interval(record.samples.values)
         if not record.stop:
             yield folder.record(record, GRAVE, "no reason for its last sample", "record why sampling stopped")
-        elif record.stop == "target" and (not bounds or (bounds[1] - bounds[0]) / 2 >
-                                          folder.study.target * float(np.median(record.samples.values)) * (1 + 1e-9)):
-            yield folder.record(record, GRAVE, f"stopped by target, but its interval is wider than {text.percent(folder.study.target)}",
+        elif record.stop == "target" and not _reached(record.samples.values, folder.study.target):
+            yield folder.record(record, GRAVE, f"stopped by target, but its interval never was within {text.percent(folder.study.target)}",
                                 "sample until the interval is within the target, or record the limit that stopped it")
         elif record.stop != "target":
             yield folder.record(record, NOTE, f"stopped by {record.stop}, not by its interval", "raise that limit, or state the interval")
+
+
+def _reached(values: np.ndarray, target: float) -> bool:
+    """Whether the interval was within the target after any sample: bases are sampled on after they stopped."""
+    for n in range(len(values), statistics.MIN_SAMPLES - 1, -1):
+        low, high = statistics.order_interval(values[:n])
+        if (high - low) / 2 <= target * float(np.median(values[:n])) * (1 + 1e-9):
+            return True
+    return False
 
 
 def comparison(folder: Folder) -> Iterator[Finding]:

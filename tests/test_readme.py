@@ -73,6 +73,18 @@ def report_of_a_small_study(words: list[str]) -> list[list[str]]:
     return [small, words]
 
 
+def comparison_of_small_studies(words: list[str]) -> list[list[str]]:
+    """Of two runs of a study of seconds, of which nothing is asked but that they are compared."""
+    folders = [word for word in words if word.startswith("results/")]
+    runs = [["build/release/bin/rasterbench", "study", "small.toml", "--out", folder, "--replace"] for folder in folders[:2]]
+    return [*runs, ["bash", "-c", f"{shlex.join(words)}; test $? -le 1"]]
+
+
+def lint_of_a_small_study(words: list[str]) -> list[list[str]]:
+    """A study of one launch breaks a rule, which is exit code 1."""
+    return [*report_of_a_small_study(words)[:1], ["bash", "-c", f"{shlex.join(words)}; test $? -eq 1"]]
+
+
 def presets_that_there_are(words: list[str]) -> list[list[str]]:
     """Configuring and building again is the tests' own prerequisite."""
     kind = "build" if "--build" in words else "configure"
@@ -93,6 +105,8 @@ TABLE: list[tuple[str, Shorten]] = [
     (PRODUCT + r"(rasterbench (render|list|scene|verify|advise|extremes|stability|fuzz|--help|--version)|graphics)\b.*", as_it_stands),
     (r"scripts/python -m analysis stability .*", as_it_stands),
     (r"scripts/python -m analysis report .*", report_of_a_small_study),
+    (r"scripts/python -m analysis compare .*", comparison_of_small_studies),
+    (r"scripts/python -m analysis lint .*", lint_of_a_small_study),
     (r"cmake --preset \S+|cmake --build --preset \S+", presets_that_there_are),
 ]
 

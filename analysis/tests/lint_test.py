@@ -174,12 +174,19 @@ def test_findings_name_file_point_and_remedy(tmp_path, capsys):
 
 
 def test_few_samples(tmp_path):
-    few = write(tmp_path / "a", launches=1, blocks=3)
-    assert {"confidence", "comparison"} <= broken(few)
-    def percentile(entry):
-        entry["p95_ms"] = 9.0
-    assert broken(write(tmp_path / "b", first(percentile), blocks=9)) >= {"confidence"}
+    assert {"confidence", "comparison"} <= broken(write(tmp_path / "a", launches=1, blocks=3))
+    assert broken(write(tmp_path / "b", first(lambda r: r.update(p95_ms=9.0)), blocks=9)) == {"confidence"}
     assert "stopping" in broken(write(tmp_path / "c", noise=0.2), "grave")  # "target", and the interval is far wider
+
+
+def test_a_base_that_was_sampled_on_after_its_target(tmp_path):
+    def noisy_end(entry):
+        calm, rng = np.full(12, 10.0), np.random.default_rng(2)
+        entry["samples_ms"] = [*calm, *(10 * np.exp(rng.normal(0, 0.5, 48)))]
+        entry["stages_ms"] = {stage: None for stage in entry["stages_ms"]}
+        restate(entry)
+
+    assert "stopping" not in broken(write(tmp_path / "a", first(noisy_end)))
 
 
 @pytest.mark.parametrize("rule, severity, change", [
