@@ -25,6 +25,7 @@ void add_extremes_command(CLI::App& app, Outcome& outcome);
 void add_fuzz_command(CLI::App& app, Outcome& outcome);
 void add_stability_command(CLI::App& app);
 void add_machine_command(CLI::App& app);
+void add_selftest_command(CLI::App& app, Outcome& outcome);
 void add_verify_command(CLI::App& app, Outcome& outcome);
 void add_runner_command(CLI::App& app, Outcome& outcome, const std::vector<std::string>& benchmark_flags);
 
@@ -53,6 +54,10 @@ ExecutionConfig execution_of(const DrawOptions& options);
 /// What the options say of the frame; width and height are 0 where they leave the size to the scene. Throws
 /// InputError.
 FrameSettings frame_settings_of(const DrawOptions& options);
+
+/// The point that the options ask for, on a model (which is read where they leave the size to the scene).
+/// Throws InputError, also where the kernel cannot run in the mode.
+Point point_of(const DrawOptions& options, const std::string& model, const std::string& scene_file);
 
 /// Adds the options of DrawOptions that a point of a study has, too: all but tie and cull.
 void add_point_options(CLI::App& command, DrawOptions& options);

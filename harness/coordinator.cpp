@@ -30,8 +30,6 @@ constexpr double kVerifyTimeout = 3600;  // seconds: a specification of a huge p
 constexpr double kSampleTimeout = 600;
 constexpr double kLimitsSeconds = 1;  // for the bandwidth of all points, unless a few repetitions take longer
 constexpr double kLongestLimitSeconds = 0.1;  // for that of one working set and thread count
-constexpr double kShortFrameMs =
-    0.5;  // below it, so many frames make one sample that it is not all clock and start-up
 
 class Coordinator {
  public:
@@ -153,9 +151,7 @@ class Coordinator {
             const double frame_ms = judgement.at("frame_ms");
             const bool warm =
                 state->planned->point.cache == "warm";  // only a sample's first frame would be cold
-            const int frames = warm && frame_ms < kShortFrameMs
-                                   ? static_cast<int>(std::clamp(1.0 / frame_ms, 1.0, 1000.0))
-                                   : 1;
+            const int frames = warm ? frames_per_sample(frame_ms) : 1;
             record_event({{"event", "verify"}, {"judgement", judgement}, {"frames", frames}}, *state);
             const double longest = study_.sampling.frame_seconds;
             if (state->failure.empty() && longest > 0 && frame_ms > longest * 1e3)
@@ -343,17 +339,7 @@ class Coordinator {
     const SamplingPlan& plan = study_.sampling;
     for (PointState& state : states_) {
       if (!state.open() || state.samples.empty()) continue;
-      const auto n = static_cast<int>(state.samples.size());
-      const std::vector<double> times = state.times_ms();
-      const auto interval = median_interval(times);
-      std::string reason;
-      if (n >= plan.min_samples && n >= plan.launches && interval &&
-          (interval->second - interval->first) / 2 <= plan.target * median(times))
-        reason = "target";
-      else if (n >= plan.max_samples)
-        reason = "max_samples";
-      else if (n >= plan.min_samples && n >= plan.launches && state.spent_ms >= plan.point_seconds * 1e3)
-        reason = "point_seconds";
+      const std::string reason = stop_reason(plan, state.times_ms(), state.spent_ms);
       if (!reason.empty()) record_event({{"event", "stop"}, {"reason", reason}}, state);
     }
   }

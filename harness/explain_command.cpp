@@ -29,27 +29,8 @@ bool is_study(const std::string& model) { return std::filesystem::path(model).ex
 
 /// The point of `render`'s options, explained in this process and in the environment that it has.
 Json explain_model(const ExplainOptions& options, const DrawOptions& draw_options) {
-  const FrameSettings settings = frame_settings_of(draw_options);
-  const Kernel::Variant& variant = find_kernel(draw_options.kernel).variant(draw_options.numeric);
-  if (!variant.make)
-    throw InputError({.field = "--kernel"}, fmt::format("{} cannot run in mode {}: {}", draw_options.kernel,
-                                                        draw_options.numeric, variant.reason));
-  Point point;
-  point.scene = parse_scene_reference(options.model + "@" + options.scene_file);
-  point.kernel = draw_options.kernel;
-  point.numeric = draw_options.numeric;
-  point.fill = settings.fill;
-  point.near_rule = settings.geometry.near_rule;
-  point.execution = execution_of(draw_options);
-  point.tile = settings.tile;
-  point.generality = settings.generality;
-  point.isa = settings.geometry.isa;
-  point.techniques = settings.techniques;
-  find_schedule(point.execution);
-  const Scene scene = open_scene(options.model, options.scene_file);
-  point.width = draw_options.size.empty() ? scene.parameters.width : settings.width;
-  point.height = draw_options.size.empty() ? scene.parameters.height : settings.height;
-  return explain_point(point, scene, options.samples);
+  const Point point = point_of(draw_options, options.model, options.scene_file);
+  return explain_point(point, open_scene(options.model, options.scene_file), options.samples);
 }
 
 const PlannedPoint& only_point(const Study& study, const std::string& pattern) {

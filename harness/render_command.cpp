@@ -46,6 +46,34 @@ FrameSettings frame_settings_of(const DrawOptions& options) {
   return settings;
 }
 
+Point point_of(const DrawOptions& options, const std::string& model, const std::string& scene_file) {
+  const FrameSettings settings = frame_settings_of(options);
+  const Kernel::Variant& variant = find_kernel(options.kernel).variant(options.numeric);
+  if (!variant.make)
+    throw InputError({.field = "--kernel"}, fmt::format("{} cannot run in mode {}: {}", options.kernel,
+                                                        options.numeric, variant.reason));
+  Point point;
+  point.scene = parse_scene_reference(model + "@" + scene_file);
+  point.kernel = options.kernel;
+  point.numeric = options.numeric;
+  point.fill = settings.fill;
+  point.near_rule = settings.geometry.near_rule;
+  point.execution = execution_of(options);
+  point.tile = settings.tile;
+  point.generality = settings.generality;
+  point.isa = settings.geometry.isa;
+  point.techniques = settings.techniques;
+  find_schedule(point.execution);
+  point.width = settings.width;
+  point.height = settings.height;
+  if (options.size.empty()) {
+    const Scene scene = open_scene(model, scene_file);
+    point.width = scene.parameters.width;
+    point.height = scene.parameters.height;
+  }
+  return point;
+}
+
 namespace {
 
 void print_needs(const Scene& scene, const FrameSettings& settings, const ModeInfo& mode) {

@@ -164,6 +164,21 @@ Json make_record(const PointState& state, const Study& study, std::optional<doub
   return record;
 }
 
+int frames_per_sample(double frame_ms) {
+  constexpr double kShortFrameMs = 0.5;
+  return frame_ms < kShortFrameMs ? static_cast<int>(std::clamp(1.0 / frame_ms, 1.0, 1000.0)) : 1;
+}
+
+std::string stop_reason(const SamplingPlan& plan, std::span<const double> times_ms, double spent_ms) {
+  const auto n = static_cast<int>(times_ms.size());
+  const bool enough = n >= plan.min_samples && n >= plan.launches;
+  const auto interval = median_interval(times_ms);
+  if (enough && interval && (interval->second - interval->first) / 2 <= plan.target * median(times_ms))
+    return "target";
+  if (n >= plan.max_samples) return "max_samples";
+  return enough && spent_ms >= plan.point_seconds * 1e3 ? "point_seconds" : "";
+}
+
 std::string summary_table(const std::vector<PointState>& states) {
   std::size_t width = 5;
   for (const PointState& state : states) width = std::max(width, state.planned->name.size());

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -52,6 +53,14 @@ void apply_event(const Json& event, PointState& state);
 /// One line of records.jsonl. `floor_ms` is that of the point, if it has one.
 Json make_record(const PointState& state, const Study& study, std::optional<double> floor_ms,
                  const std::string& context_id);
+
+/// Why a point is sampled no more ("target", "max_samples", "point_seconds"), or empty. `times_ms` are its
+/// samples, `spent_ms` its time in timed frames. Precondition: at least one sample.
+std::string stop_reason(const SamplingPlan& plan, std::span<const double> times_ms, double spent_ms);
+
+/// Frames that make one sample of a point with warm caches: more than one where a frame is so short that a
+/// sample would be all clock and start-up. `frame_ms` is the time of one.
+int frames_per_sample(double frame_ms);
 
 /// A table for the terminal: name, median, interval, samples, or the reason why there is none.
 std::string summary_table(const std::vector<PointState>& states);

@@ -12,6 +12,25 @@ std::vector<double> sorted(std::span<const double> values) {
   return copy;
 }
 
+/// P(Binomial(n, p) >= k) for 0 < p < 1.
+double at_least(int k, int n, double p) {
+  double sum = 0;
+  for (int i = k; i <= n; ++i)
+    sum += std::exp(std::lgamma(n + 1.0) - std::lgamma(i + 1.0) - std::lgamma(n - i + 1.0) + i * std::log(p) +
+                    (n - i) * std::log1p(-p));
+  return sum;
+}
+
+/// The p at which at_least(k, n, p), which grows with p, is `tail`.
+double p_of_tail(int k, int n, double tail) {
+  double low = 0, high = 1;
+  for (int step = 0; step < 60; ++step) {
+    const double middle = (low + high) / 2;
+    (at_least(k, n, middle) < tail ? low : high) = middle;
+  }
+  return (low + high) / 2;
+}
+
 }  // namespace
 
 double median(std::span<const double> values) {
@@ -40,6 +59,12 @@ std::optional<double> percentile_95(std::span<const double> values) {
   if (values.size() < 59) return std::nullopt;
   const std::vector<double> x = sorted(values);
   return x[static_cast<std::size_t>(std::ceil(0.95 * static_cast<double>(x.size()))) - 1];
+}
+
+std::pair<double, double> proportion_interval(int successes, int trials) {
+  constexpr double kTail = 0.025;
+  return {successes == 0 ? 0 : p_of_tail(successes, trials, kTail),
+          successes == trials ? 1 : p_of_tail(successes + 1, trials, 1 - kTail)};
 }
 
 }  // namespace rasterbench

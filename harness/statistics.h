@@ -20,4 +20,8 @@ std::optional<std::pair<double, double>> median_interval(std::span<const double>
 /// %.
 std::optional<double> percentile_95(std::span<const double> values);
 
+/// The exact 95 % interval of a probability from `successes` of `trials` (Clopper & Pearson 1934).
+/// Precondition: 0 <= successes <= trials, trials > 0.
+std::pair<double, double> proportion_interval(int successes, int trials);
+
 }  // namespace rasterbench

@@ -80,6 +80,12 @@ def comparison_of_small_studies(words: list[str]) -> list[list[str]]:
     return [*runs, ["bash", "-c", f"{shlex.join(words)}; test $? -le 1"]]
 
 
+def selftest_of_few(words: list[str]) -> list[list[str]]:
+    """Two comparisons; they may differ by chance."""
+    few = [*words[:2], "teapot:triangles=300", "--comparisons", "2", "--max-samples", "10", *words[4:]]
+    return [["bash", "-c", f"{shlex.join(few)}; test $? -le 1"]]
+
+
 def lint_of_a_small_study(words: list[str]) -> list[list[str]]:
     """A study of one launch breaks a rule, which is exit code 1."""
     return [*report_of_a_small_study(words)[:1], ["bash", "-c", f"{shlex.join(words)}; test $? -eq 1"]]
@@ -102,6 +108,7 @@ TABLE: list[tuple[str, Shorten]] = [
     (PRODUCT + r"rasterbench study .*", planned_only),
     (PRODUCT + r"rasterbench machine( .*)?", machine_of_a_small_point),
     (PRODUCT + r"rasterbench explain .*", explanation_of_a_small_picture),
+    (PRODUCT + r"rasterbench selftest .*", selftest_of_few),
     (PRODUCT + r"(rasterbench (render|list|scene|verify|advise|extremes|stability|fuzz|--help|--version)|graphics)\b.*", as_it_stands),
     (r"scripts/python -m analysis stability .*", as_it_stands),
     (r"scripts/python -m analysis report .*", report_of_a_small_study),
