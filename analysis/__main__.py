@@ -1,4 +1,4 @@
-"""Command line: python3 -m analysis report DIR, table DIR, speed DIR, compare DIR_A DIR_B, lint DIR, stability FILE."""
+"""Command line: python3 -m analysis report DIR, table DIR, speed DIR, compare DIR_A DIR_B, lint DIR, selftest FILE, stability FILE."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def share(words: str) -> float:
 
 def parser() -> Parser:
     main = Parser(prog="python3 -m analysis", description="Turns the records of a study into figures, tables and a report.",
-                  epilog="Exit codes: 0 done, 1 compare found a slower point or lint a broken rule, 2 bad input or usage (one line on stderr), 3 compare"
-                         " found a point that only A has, or that failed in B.")
+                  epilog="Exit codes: 0 done, 1 compare found a slower point, lint a broken rule or selftest too many differences,"
+                         " 2 bad input or usage (one line on stderr), 3 compare found a point that only A has, or that failed in B.")
     main.add_argument("--version", action="version", version=f"rasterbench analysis {__version__}")
     commands = main.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=Parser)
     report = commands.add_parser("report", help="write report.html, figures/ and tables/ and print three findings",
@@ -70,6 +70,10 @@ def parser() -> Parser:
                                                 " prints where each numeric mode breaks.")
     stability.add_argument("file", metavar="FILE", type=Path, help="the sweeps, one JSON object a line (stability.jsonl)")
     stability.add_argument("-o", "--out", metavar="FOLDER", type=Path, help="where to write (default: the folder of FILE)")
+    selftest = commands.add_parser("selftest", help="say how often the report would tell a point from itself",
+                                   description="Judges the comparisons of `rasterbench selftest -o FILE` as the report judges points."
+                                               " Exit codes: 0 no more false differences than stated, 1 more, 2 bad input.")
+    selftest.add_argument("file", metavar="FILE", type=Path, help="one comparison a line (rasterbench selftest -o)")
     report.add_argument("--out", metavar="FILE", type=Path, help="where to write the report (default: DIR/report.html)")
     return main
 
@@ -84,6 +88,12 @@ def main(arguments: list[str] | None = None) -> int:
             print(stability.plain(options.file))
             print(f"written: {', '.join(map(str, written))}")
             return 0
+        if options.command == "selftest":
+            from . import selftest
+
+            outcome = selftest.judge(selftest.read(options.file))
+            print(selftest.plain(outcome))
+            return outcome.status
         if options.command == "compare":
             from . import compare
 

@@ -113,6 +113,7 @@ TABLE: list[tuple[str, Shorten]] = [
     (r"scripts/python -m analysis stability .*", as_it_stands),
     (r"scripts/python -m analysis report .*", report_of_a_small_study),
     (r"scripts/python -m analysis compare .*", comparison_of_small_studies),
+    (r"scripts/python -m analysis selftest .*", as_it_stands),
     (r"scripts/python -m analysis lint .*", lint_of_a_small_study),
     (r"cmake --preset \S+|cmake --build --preset \S+", presets_that_there_are),
 ]
