@@ -13,7 +13,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Callable, Iterator
 
-from . import load, text
+from . import load, sidecars, text
 from .comparison import Analysis
 from .load import Record
 
@@ -95,8 +95,15 @@ class Folder:
         found = []
         for path in sorted(folder.glob("*.json")) if folder.is_dir() else ():
             if not path.name.startswith("."):
-                found.append((f"figures/{path.name}", load.parse(load.read_text(path), path, None)))
+                found.append((f"figures/{path.name}", sidecars.read(path)))
         return found
+
+    @cached_property
+    def undescribed(self) -> list[str]:
+        """Pictures in figures/ that nothing beside them describes."""
+        folder = self.directory / "figures"
+        described = {file for file, _ in self.figures}
+        return [f"figures/{path.name}" for path in sorted(folder.glob("*.png")) if f"figures/{path.stem}.json" not in described]
 
     def record(self, record: Record, severity: str, problem: str, remedy: str) -> Finding:
         return Finding(severity, f"records.jsonl:{record.line}", record.name, problem, remedy)
@@ -111,13 +118,14 @@ def lint(analysis: Analysis, figures: dict[str, bytes] | None = None) -> Result:
 
     folder = Folder(analysis)
     if figures is not None:
+        folder.undescribed = []  # report.py removes what it no longer draws
         folder.figures = [(f"figures/{name}", json.loads(content)) for name, content in sorted(figures.items()) if name.endswith(".json")]
     verdicts = []
     for rule in RULES:
         hidden = rule.why_not
         if rule.needs == "journal" and folder.journal is None:
             hidden = "journal.jsonl is not here"
-        elif rule.needs == "figures" and not folder.figures:
+        elif rule.needs == "figures" and not folder.figures and not folder.undescribed:
             hidden = "no figures are here: run `python3 -m analysis report` first"
         verdicts.append(Verdict(rule, [] if hidden or rule.check is None else list(rule.check(folder)), hidden))
     return Result(folder.directory, verdicts)

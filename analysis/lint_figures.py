@@ -12,9 +12,11 @@ RATIOS = ("speedup", "efficiency")
 
 
 def caption(folder: Folder) -> Iterator[Finding]:
+    for file in folder.undescribed:
+        yield Finding(GRAVE, file, file, "nothing beside it says what it shows", "draw it with `python3 -m analysis report`, or move it away")
     for file, figure in folder.figures:
-        facts = figure.get("facts")
-        if not isinstance(facts, dict):
+        facts = figure["facts"]
+        if facts is None:
             yield Finding(GRAVE, file, _name(figure), "says nothing of its data", "give its caption the facts (captions.Facts)")
             continue
         if not facts.get("machine") or str(facts["machine"]).startswith("unknown"):
@@ -27,20 +29,20 @@ def caption(folder: Folder) -> Iterator[Finding]:
 
 def base(folder: Folder) -> Iterator[Finding]:
     for file, figure in folder.figures:
-        ratio = next((w for w in RATIOS if any(w in str(label).lower() for label in figure.get("axes") or ())), None)
-        if ratio and not (figure.get("facts") or {}).get("base"):
+        ratio = next((w for w in RATIOS if any(w in str(label).lower() for label in figure["axes"])), None)
+        if ratio and not (figure["facts"] or {}).get("base"):
             yield Finding(GRAVE, file, _name(figure), f"an axis of {ratio} and no base in the caption", "name the base and its seconds")
 
 
 def lines(folder: Folder) -> Iterator[Finding]:
     for file, figure in folder.figures:
-        for line in figure.get("lines_across_categories") or ():
+        for line in figure["lines_across_categories"]:
             yield Finding(GRAVE, file, _name(figure), f"a line joins categories ({line})", "draw points: there is nothing between kernels")
 
 
 def legible(folder: Folder) -> Iterator[Finding]:
     for file, figure in folder.figures:
-        smallest, size = figure.get("smallest_text_pt"), figure.get("size_inches") or [0, 0]
+        smallest, size = figure["smallest_text_pt"], figure["size_inches"]
         if smallest is not None and smallest < SMALLEST_TEXT:
             yield Finding(NOTE, file, _name(figure), f"text of {smallest:g} points", f"use at least {SMALLEST_TEXT:g}")
         if size[0] > style.FULL_WIDTH + 0.01 or size[1] > style.MAX_HEIGHT + 0.8:
@@ -49,15 +51,15 @@ def legible(folder: Folder) -> Iterator[Finding]:
 
 def grey(folder: Folder) -> Iterator[Finding]:
     for file, figure in folder.figures:
-        for a, b in figure.get("alike_in_grey") or ():
+        for a, b in figure["alike_in_grey"]:
             yield Finding(NOTE, file, _name(figure), f"{a!r} and {b!r} differ in colour only", "give them markers, dashes or hatches")
 
 
 def current(folder: Folder) -> Iterator[Finding]:
     for file, figure in folder.figures:
-        if figure.get("records") != folder.study.records_hash:
+        if figure["records"] != folder.study.records_hash:
             yield Finding(GRAVE, file, _name(figure), "was drawn from other records than those here", "run `python3 -m analysis report`")
 
 
 def _name(figure: dict[str, Any]) -> str:
-    return str(figure.get("title") or figure.get("name") or "a figure")
+    return str(figure["title"])

@@ -257,7 +257,7 @@ def crash(folder: Folder) -> Iterator[Finding]:
             yield Finding(NOTE if name == "context.json" else GRAVE, name, "end", "its last line has no end: it was not written whole",
                           "make it again from the journal: rasterbench study --resume")
     known = {record.id for record in folder.study.every_record}
-    lost = sorted({str(event["id"]) for event in folder.journal or () if event.get("event") == "sample" and event.get("id") not in known})
+    lost = sorted({str(event.get("id")) for event in folder.journal or () if event.get("event") == "sample" and event.get("id") not in known})
     for identity in lost:
         yield Finding(GRAVE, "journal.jsonl", identity, "was sampled and has no record", "make the records from the whole journal")
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 from dataclasses import asdict
 from itertools import combinations
+from pathlib import Path
 from typing import Any, Iterator
 
 import numpy as np
@@ -20,8 +21,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.text import Text
 
-from . import style
+from . import load, style
 from .figures.common import Drawing
+from .load import InputError
+from .statistics import is_number
 
 SCHEMA = 1
 GREY_STEP = 0.12  # least difference of lightness (0 to 1) of two shades that a legend tells apart by nothing else
@@ -31,6 +34,23 @@ def files(drawing: Drawing, records: str = "") -> dict[str, bytes]:
     """NAME.svg, .pdf, .png and .json."""
     made = {f"{drawing.name}.{kind}": content for kind, content in style.outputs(drawing.figure).items()}
     return made | {f"{drawing.name}.json": (json.dumps(describe(drawing, records), indent=1, ensure_ascii=False) + "\n").encode()}
+
+
+def read(path: Path) -> dict[str, Any]:
+    """What describe() wrote; throws InputError where it did not."""
+    value = load.parse(load.read_text(path), path, None)
+    size, smallest = value.get("size_inches"), value.get("smallest_text_pt")
+    pairs = value.get("alike_in_grey")
+    right = {"schema": value.get("schema") == SCHEMA, "title": isinstance(value.get("title"), str),
+             "facts": value.get("facts") is None or isinstance(value["facts"], dict), "records": isinstance(value.get("records"), str),
+             "size_inches": isinstance(size, list) and len(size) == 2 and all(map(is_number, size)),
+             "axes": isinstance(value.get("axes"), list), "smallest_text_pt": smallest is None or is_number(smallest),
+             "lines_across_categories": isinstance(value.get("lines_across_categories"), list),
+             "alike_in_grey": isinstance(pairs, list) and all(isinstance(pair, list) and len(pair) == 2 for pair in pairs)}
+    for key, is_right in right.items():
+        if not is_right:
+            raise InputError(path, f"{value.get(key)!r} is not what `python3 -m analysis report` writes", None, key)
+    return value
 
 
 def describe(drawing: Drawing, records: str) -> dict[str, Any]:

@@ -284,7 +284,7 @@ def test_bad_usage_of_graphics(arguments: list[str], words: list[str], folder: P
     refuse_in(folder, arguments, *words, name="graphics")
 
 
-@pytest.mark.parametrize("command", [[], ["render"], ["study"], ["list"], ["scene"]], ids=lambda c: " ".join(c) or "program")
+@pytest.mark.parametrize("command", [[], ["render"], ["study"], ["list"], ["scene"], ["selftest"]], ids=lambda c: " ".join(c) or "program")
 def test_help_and_version_of_every_command(command: list[str], tmp_path: Path) -> None:
     outcome = run(*command, "--help", cwd=tmp_path).ok()
     assert "Usage" in outcome.stdout and outcome.stderr == ""

@@ -271,6 +271,24 @@ def test_figures(tmp_path, reported, rule, change):
     assert {f.file for f in result.findings} == {f"figures/{path.name}"}
 
 
+def test_a_picture_that_nothing_describes(tmp_path, reported):
+    directory = shutil.copytree(reported, tmp_path / "a")
+    (directory / "figures/by_hand.png").write_bytes(b"")
+    result = lint.lint(analyse(directory))
+    assert [(v.rule.id, f.file) for v in result.verdicts for f in v.findings] == [("plot-caption", "figures/by_hand.png")]
+
+
+@pytest.mark.parametrize("key, value", [("size_inches", "x"), ("facts", []), ("axes", None), ("alike_in_grey", [["a"]]), ("schema", 2),
+                                        ("smallest_text_pt", "7"), ("lines_across_categories", 3), ("records", None), ("title", 1)])
+def test_bad_sidecars(tmp_path, reported, capsys, key, value):
+    directory = shutil.copytree(reported, tmp_path / "a")
+    path = next((directory / "figures").glob("time_*.json"))
+    path.write_text(json.dumps(json.loads(path.read_text()) | {key: value}))
+    assert program.main(["lint", str(directory)]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1 and f"{path.name}: {key}" in err
+
+
 def drawn(plot):
     with matplotlib.rc_context(style.RC):
         figure = Figure(figsize=(3, 2))
