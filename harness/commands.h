@@ -21,6 +21,7 @@ void add_list_command(CLI::App& app);
 void add_scene_command(CLI::App& app);
 void add_explain_command(CLI::App& app);
 void add_advise_command(CLI::App& app, Outcome& outcome);
+void add_adopt_command(CLI::App& app, Outcome& outcome);
 void add_extremes_command(CLI::App& app, Outcome& outcome);
 void add_fuzz_command(CLI::App& app, Outcome& outcome);
 void add_stability_command(CLI::App& app);

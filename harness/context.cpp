@@ -58,6 +58,8 @@ Json caches(hwloc_topology_t topology) {
   return list;
 }
 
+}  // namespace
+
 Json describe_machine() {
   Json machine;
   utsname name{};
@@ -97,8 +99,6 @@ Json relevant_environment() {
   }
   return variables;
 }
-
-}  // namespace
 
 std::string build_id() { return hash_file("/proc/self/exe"); }
 

@@ -12,6 +12,10 @@ std::string build_id();
 Json describe_context(const Study& study, const StudyOptions& options,
                       const std::map<std::string, std::string>& custom);
 
+/// `machine`, and the variables of `environment` that are set, of context.json.
+Json describe_machine();
+Json relevant_environment();
+
 /// Now, ISO 8601, UTC.
 std::string utc_now();
 

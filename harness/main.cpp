@@ -38,6 +38,7 @@ int run(int argc, char** argv) {
   add_list_command(app);
   add_scene_command(app);
   add_advise_command(app, outcome);
+  add_adopt_command(app, outcome);
   add_extremes_command(app, outcome);
   add_fuzz_command(app, outcome);
   add_stability_command(app);
