@@ -28,6 +28,7 @@ struct AdoptOptions {
   double limit = 60;           ///< seconds for one run
   int repetitions = 20;        ///< judged runs of each number of threads
   double judge_seconds = 60;   ///< begin no further repetition after this long
+  double race_seconds = 10;    ///< of runs on race_scene(); 0: none
   std::int64_t max_wrong = 0;  ///< pixels beyond every bound that are let pass
   double target = 0.02;        ///< half the interval, as a share of the median
   int min_samples = 6, max_samples = 30;
@@ -59,7 +60,9 @@ struct JudgedRun {
 class AdoptWorkplace {
  public:
   /// Throws InputError where PROGRAM is no file that can be run, or OUT cannot be written.
-  AdoptWorkplace(const AdoptOptions& options, const Scene& scene, int width, int height);
+  /// `name` tells it from other workplaces of this process.
+  AdoptWorkplace(const AdoptOptions& options, const Scene& scene, int width, int height,
+                 const std::string& name);
 
   /// Runs the program and reads its picture into `pixels`. Throws InputError where it cannot be started, and
   /// Interrupted.
@@ -99,8 +102,9 @@ class AdoptVerdict {
   /// Whether nothing speaks against the program so far.
   bool is_correct() const;
 
-  /// The `judgement` of adopt.json. Writes difference.png and picture.png into `folder` where pixels differ.
-  Json conclude(const std::filesystem::path& folder);
+  /// The `judgement` of adopt.json. Where pixels differ, writes difference.png and picture.png into `folder`,
+  /// their names after `prefix`.
+  Json conclude(const std::filesystem::path& folder, const std::string& prefix);
 
  private:
   struct Drawn {
@@ -122,7 +126,8 @@ class AdoptVerdict {
   std::map<std::string, Drawn> pictures_;
 };
 
-/// Judged runs over thread counts and repetitions, until the time is up; stops early at a run that hangs.
+/// Judged runs over thread counts and repetitions, until the time is up; stops early at a run that hangs, and
+/// after a few repetitions where something is wrong.
 void run_judged(const AdoptOptions& options, const AdoptWorkplace& workplace, AdoptVerdict& verdict,
                 Progress& progress);
 

@@ -1,8 +1,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <regex>
 
+#include "adopt/race_scene.h"
 #include "base/error.h"
 #include "base/hash.h"
 #include "build_info.h"
@@ -139,6 +141,25 @@ std::string nearest_text(const Json& nearest) {
                      differing.get<std::int64_t>());
 }
 
+/// The same program on race_scene(): a race that the user's own scene seldom shows is the same error.
+Json provoke_races(const AdoptOptions& options, Progress& progress) {
+  AdoptOptions stress = options;
+  stress.model = stress.scene_file = stress.size = "";
+  stress.threads = {16};
+  stress.repetitions = std::numeric_limits<int>::max();  // until the time is up
+  stress.judge_seconds = options.race_seconds;
+  const Scene scene = race_scene();
+  FrameSettings settings;
+  settings.width = scene.parameters.width;
+  settings.height = scene.parameters.height;
+  settings.fill = parse_fill(options.fill, "--fill");
+  const AdoptWorkplace workplace(stress, scene, settings.width, settings.height, "races");
+  PictureJudge judge(scene, settings, available_cpus());
+  AdoptVerdict verdict(stress, judge, settings.width, settings.height);
+  run_judged(stress, workplace, verdict, progress);
+  return verdict.conclude(options.out, "races_");
+}
+
 int adopt(AdoptOptions& options) {
   check_options(options);
   const Scene scene = open_scene(options.model, options.scene_file);
@@ -148,7 +169,7 @@ int adopt(AdoptOptions& options) {
   if (!options.size.empty()) std::tie(settings.width, settings.height) = parse_size(options.size, "--size");
   settings.fill = parse_fill(options.fill, "--fill");
   settings.geometry.near_rule = parse_near(options.near_rule, "--near");
-  const AdoptWorkplace workplace(options, scene, settings.width, settings.height);
+  const AdoptWorkplace workplace(options, scene, settings.width, settings.height, "work");
   catch_interrupts();
   const std::string started = utc_now();
 
@@ -163,8 +184,13 @@ int adopt(AdoptOptions& options) {
   AdoptVerdict verdict(options, judge, settings.width, settings.height);
   run_judged(options, workplace, verdict, progress);
 
+  // What is wrong already needs no provocation.
+  const Json races =
+      verdict.is_correct() && options.race_seconds > 0 ? provoke_races(options, progress) : Json();
+  const bool is_safe = races.is_null() || races.at("correct").get<bool>();
+
   std::optional<Json> timing;
-  if (verdict.is_correct()) {
+  if (verdict.is_correct() && is_safe) {
     // A program that never asks for OMP_SCHEDULE is timed as it was compiled.
     const bool one = use.use == ScheduleUse::kFixed || use.use == ScheduleUse::kNoOpenMp;
     timing = time_program(options, options.threads, one ? std::vector<std::string>{""} : options.schedules,
@@ -189,27 +215,34 @@ int adopt(AdoptOptions& options) {
   result["machine"] = describe_machine();
   result["environment"] = {{"binding", options.binding},
                            {"cleared", {"OMP_*", "GOMP_*", "KMP_*", "LD_PRELOAD"}}};
-  result["judgement"] = verdict.conclude(out);
+  result["judgement"] = verdict.conclude(out, "");
+  result["races"] = races;
   result["openmp"] = openmp_json(use, file, probe, most_threads);
   result["timing"] = timing ? *timing : Json();
   result["slurm"] = Json();
   const Json& judgement = result["judgement"];
+  const bool is_correct = judgement.at("correct").get<bool>() && is_safe;
+  result["correct"] = is_correct;
 
   fmt::print("{} on {} at {}x{}: {}\n", options.program, options.model, settings.width, settings.height,
-             judgement.at("correct").get<bool>() ? "CORRECT" : "WRONG");
+             is_correct ? "CORRECT" : "WRONG");
   for (const Json& problem : judgement.at("problems"))
     fmt::print("  {}\n", problem.at("text").get<std::string>());
+  if (!is_safe)
+    for (const Json& problem : races.at("problems"))
+      fmt::print("  On a scene made to provoke races: {}\n", problem.at("text").get<std::string>());
   if (!judgement.at("nearest").empty()) {
     const Json& usual = judgement.at("pictures").front();
     fmt::print("  {} runs, {} picture{}; {}; {} differ from exact arithmetic, {} of them wrong\n",
                judgement.at("runs").size(), judgement.at("pictures").size(),
                judgement.at("pictures").size() == 1 ? "" : "s", nearest_text(judgement.at("nearest")),
                usual.at("differ").get<std::int64_t>(), usual.at("wrong").get<std::int64_t>());
-    if (judgement.at("pictures").size() == 1)
-      fmt::print(
-          "  all runs drew the same picture, up to {} threads; that shows no race, and proves none away\n",
-          std::max(8, options.threads.back()));
   }
+  if (is_correct && judgement.at("pictures").size() == 1)
+    fmt::print(
+        "  no race was seen in {} runs on this scene and {} on one made to provoke them; that proves none "
+        "away\n",
+        judgement.at("runs").size(), races.is_null() ? 0 : races.at("runs").size());
   for (const Json& note : judgement.at("notes")) fmt::print("  note: {}\n", note.get<std::string>());
   fmt::print("  OpenMP: {}\n", use.text);
   std::vector<std::string> written{"adopt.json"};
@@ -226,11 +259,15 @@ int adopt(AdoptOptions& options) {
   } else {
     fmt::print("  not timed: a program that is judged wrong shows no speed\n");
   }
-  if (!judgement.at("difference").is_null()) written.insert(written.end(), {"difference.png", "picture.png"});
+  for (const Json* judged : {&judgement, &races}) {
+    if (judged->is_null() || judged->at("difference").is_null()) continue;
+    written.push_back(judged->at("difference"));
+    written.push_back(judged->at("picture"));
+  }
   write_file(out / "adopt.json", dump(result, 1) + "\n");
   fmt::print("wrote {} in {}", fmt::join(written, ", "), options.out);
   fmt::print("{}\n", timing ? "; figures and tables: scripts/python -m analysis adopt " + options.out : "");
-  return judgement.at("correct").get<bool>() ? 0 : 1;
+  return is_correct ? 0 : 1;
 }
 
 }  // namespace

@@ -233,7 +233,7 @@ void AdoptVerdict::add_picture_problems(Json& problems, Json& notes, Json& judge
                                              wrong, advice(bad.findings, judge_.whole(bad.pixels)))}});
 }
 
-Json AdoptVerdict::conclude(const std::filesystem::path& folder) {
+Json AdoptVerdict::conclude(const std::filesystem::path& folder, const std::string& prefix) {
   Json judgement, problems = Json::array(), notes = Json::array();
   judgement["correct"] = is_correct();
   add_run_problems(problems);
@@ -258,7 +258,7 @@ Json AdoptVerdict::conclude(const std::filesystem::path& folder) {
   judgement["pictures"] = Json::array();
   judgement["first_pixels"] = Json::array();
   judgement["box"] = Json();
-  judgement["difference"] = Json();
+  judgement["difference"] = judgement["picture"] = Json();
   if (!pictures_.empty()) {
     add_picture_problems(problems, notes, judgement);
     std::vector<const Drawn*> ordered(pictures_.size());
@@ -329,9 +329,10 @@ Json AdoptVerdict::conclude(const std::filesystem::path& folder) {
         classes.unexplained += kind == PixelClass::kUnexplained;
       }
       const DifferenceImage image = difference_image(classes, judge_.truth(), width_, height_);
-      write_image(folder / "difference.png", image.pixels, image.width, image.height);
-      write_image(folder / "picture.png", shown.pixels, width_, height_);
-      judgement["difference"] = "difference.png";
+      write_image(folder / (prefix + "difference.png"), image.pixels, image.width, image.height);
+      write_image(folder / (prefix + "picture.png"), shown.pixels, width_, height_);
+      judgement["difference"] = prefix + "difference.png";
+      judgement["picture"] = prefix + "picture.png";
     }
   }
   judgement["problems"] = std::move(problems);
