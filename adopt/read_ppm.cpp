@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <optional>
 #include <string_view>
+#include <system_error>
 
 #include "base/error.h"
 #include "scene/input_file.h"
@@ -52,8 +53,12 @@ PpmFile refused(std::string problem) { return {.problem = std::move(problem)}; }
 }  // namespace
 
 PpmFile read_ppm(const std::filesystem::path& path, int width, int height) try {
+  // Asked before it is opened: a pipe without a writer would hold whoever opens it.
+  std::error_code error;
+  const std::filesystem::file_status status = std::filesystem::status(path, error);
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
+    return refused("is no plain file");
   InputFile file(path);
-  if (!file.is_regular()) return refused("is no plain file");
   if (file.size() == 0) return refused("is empty");
   std::string head(kMostHeader, '\0');
   head.resize(file.read(head.data(), head.size()));

@@ -1,6 +1,7 @@
 #include "adopt/read_ppm.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "scene/test_folder.h"
 
@@ -55,7 +56,9 @@ TEST(ReadPpm, Refused) {
 TEST(ReadPpm, NoPlainFile) {
   const TestFolder folder;
   EXPECT_NE(read_ppm(folder / "none.ppm", 2, 1).problem, "");
-  EXPECT_NE(read_ppm("/dev/zero", 2, 1).problem, "");
+  EXPECT_EQ(read_ppm("/dev/zero", 2, 1).problem, "is no plain file");
+  ASSERT_EQ(mkfifo((folder / "pipe.ppm").c_str(), 0600), 0);
+  EXPECT_EQ(read_ppm(folder / "pipe.ppm", 2, 1).problem, "is no plain file");
 }
 
 }  // namespace

@@ -13,7 +13,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
+#include <cstdlib>
 #include <cstring>
+#include <fstream>
 #include <iterator>
 #include <string_view>
 #include <system_error>
@@ -104,6 +106,14 @@ int count_threads(pid_t pid) {
   return error ? 0 : static_cast<int>(std::distance(begin(tasks), end(tasks)));
 }
 
+/// VmHWM of proc(5): the largest resident set so far, bytes.
+std::int64_t peak_memory(pid_t pid) {
+  std::ifstream file(fmt::format("/proc/{}/status", pid));
+  for (std::string line; std::getline(file, line);)
+    if (line.starts_with("VmHWM:")) return std::strtoll(line.c_str() + 6, nullptr, 10) * 1024;
+  return 0;
+}
+
 double seconds_of(const timeval& time) {
   return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
 }
@@ -171,10 +181,13 @@ ProgramResult run_program(const ProgramRun& run) {
   const auto deadline = begin + std::chrono::duration<double>(run.limit_seconds);
   for (;;) {
     pollfd events[2] = {{ended.number(), POLLIN, 0}, {talks ? reading.number() : -1, POLLIN, 0}};
-    poll(events, 2, run.watch_threads ? 2 : 100);
+    poll(events, 2, run.watch ? 2 : 100);
     if (events[0].revents != 0) break;
     if (events[1].revents != 0) talks = output.read_from(reading.number());
-    if (run.watch_threads) result.most_threads = std::max(result.most_threads, count_threads(pid));
+    if (run.watch) {
+      result.most_threads = std::max(result.most_threads, count_threads(pid));
+      result.max_rss_bytes = std::max(result.max_rss_bytes, peak_memory(pid));
+    }
     if (killed != RunEnd::kExited) continue;
     if (Clock::now() >= deadline) killed = RunEnd::kTimeLimit;
     if (run.stop && run.stop()) killed = RunEnd::kStopped;
@@ -190,7 +203,6 @@ ProgramResult run_program(const ProgramRun& run) {
 
   result.seconds = std::chrono::duration<double>(end - begin).count();
   result.cpu_seconds = seconds_of(usage.ru_utime) + seconds_of(usage.ru_stime);
-  result.max_rss_bytes = std::int64_t{usage.ru_maxrss} * 1024;
   result.output = output.take();
   if (failure != 0) {
     result.end = RunEnd::kNotStarted;

@@ -20,8 +20,8 @@ struct ProgramRun {
   std::map<std::string, std::string> variables = {};
   double limit_seconds = 60;         ///< then the whole group is killed
   std::uint64_t max_file_bytes = 0;  ///< of any file that it writes; 0: no limit
-  bool watch_threads = false;        ///< count its threads every few milliseconds: not for timed runs
-  std::function<bool()> stop = {};   ///< asked a few times a second: true kills the group
+  bool watch = false;  ///< look at its threads and memory every few milliseconds: not for timed runs
+  std::function<bool()> stop = {};  ///< asked a few times a second: true kills the group
 };
 
 /// How a run ended.
@@ -36,11 +36,13 @@ enum class RunEnd {
 struct ProgramResult {
   RunEnd end = RunEnd::kNotStarted;
   int code = 0;
-  double seconds = 0;              ///< wall time from before the process exists until it has ended
-  double cpu_seconds = 0;          ///< user and system time of all its threads
-  std::int64_t max_rss_bytes = 0;  ///< the most memory that it had
-  int most_threads = 0;            ///< seen at once, at least so many; 0: not watched
-  std::string output;              ///< stdout and stderr together, the last kOutputBytes of them
+  double seconds = 0;      ///< wall time from before the process exists until it has ended
+  double cpu_seconds = 0;  ///< user and system time of all its threads
+  /// The most memory that it was seen to have. Not the kernel's ru_maxrss, in which exec counts this
+  /// process's own; 0: not watched, or over before it was looked at.
+  std::int64_t max_rss_bytes = 0;
+  int most_threads = 0;  ///< seen at once, at least so many; 0: not watched
+  std::string output;    ///< stdout and stderr together, the last kOutputBytes of them
 };
 
 inline constexpr std::size_t kOutputBytes = 64 * 1024;

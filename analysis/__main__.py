@@ -1,4 +1,4 @@
-"""Command line: python3 -m analysis report DIR, table DIR, speed DIR, compare DIR_A DIR_B, lint DIR, selftest FILE, stability FILE."""
+"""Command line: python3 -m analysis report DIR, table DIR, speed DIR, compare DIR_A DIR_B, lint DIR, selftest FILE, adopt DIR, stability FILE."""
 
 from __future__ import annotations
 
@@ -74,6 +74,10 @@ def parser() -> Parser:
                                    description="Judges the comparisons of `rasterbench selftest -o FILE` as the report judges points."
                                                " Exit codes: 0 no more false differences than stated, 1 more, 2 bad input.")
     selftest.add_argument("file", metavar="FILE", type=Path, help="one comparison a line (rasterbench selftest -o)")
+    adopt = commands.add_parser("adopt", help="draw speedup, efficiency and schedules of a program that rasterbench adopt has timed",
+                                description="Writes DIR/figures/*.svg, *.pdf, *.png with their captions, .txt, and DIR/tables/*.csv, *.tex,"
+                                            " then prints the times with 95 %% intervals.")
+    adopt.add_argument("directory", metavar="DIR", type=Path, help="folder of `rasterbench adopt --out`, with adopt.json")
     report.add_argument("--out", metavar="FILE", type=Path, help="where to write the report (default: DIR/report.html)")
     return main
 
@@ -106,6 +110,11 @@ def main(arguments: list[str] | None = None) -> int:
             if written and not options.json:
                 print(f"written: {', '.join(map(str, written))}")
             return outcome.status
+        if options.command == "adopt":
+            from . import adopt
+
+            print(adopt.write(options.directory))
+            return 0
         study = load(options.directory)
         # Imported late: a wrong path should not wait for matplotlib.
         from .comparison import Analysis

@@ -137,13 +137,7 @@ class Analysis:
     @cached_property
     def machine(self) -> str:
         """'AMD EPYC 7763, 8 CPUs' for captions."""
-        machine = self.study.context["machine"]
-        cpu = machine.get("cpu")
-        words = [str(cpu) if cpu and not str(cpu).startswith("unavailable") else "unknown CPU"]
-        allowed = machine.get("cpus_allowed")
-        if isinstance(allowed, list):
-            words.append(text.count(len(allowed), "CPU") + " allowed")
-        return ", ".join(words)
+        return text.machine(self.study.context["machine"])
 
     # groups and bases
 

@@ -180,7 +180,7 @@ def parse(text: str, path: Path, line: int | None) -> dict[str, Any]:
     return value
 
 
-def _schema(value: dict[str, Any], path: Path, line: int | None) -> None:
+def check_schema(value: dict[str, Any], path: Path, line: int | None) -> None:
     if "schema" not in value:
         raise InputError(path, "missing", line, "schema")
     if value["schema"] != SCHEMA or isinstance(value["schema"], bool):
@@ -189,7 +189,7 @@ def _schema(value: dict[str, Any], path: Path, line: int | None) -> None:
 
 def _context(path: Path) -> dict[str, Any]:
     context = parse(read_text(path), path, None)
-    _schema(context, path, None)
+    check_schema(context, path, None)
     for key in ("program", "machine", "study"):
         if key not in context:
             raise InputError(path, "missing", None, key)
@@ -238,7 +238,7 @@ class _Reader:
 
     def record(self) -> Record:
         value = self.value
-        _schema(value, self.path, self.line)
+        check_schema(value, self.path, self.line)
         identity, name = self.text(value, "id"), self.text(value, "name")
         config = self.config()
         status = self.text(value, "status")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import textwrap
+from typing import Any
 
 MISSING = "–"
 
@@ -65,3 +66,13 @@ def span(values: list[int]) -> str:
         return "no samples"
     low, high = min(values), max(values)
     return f"n = {low}" if low == high else f"n = {low} to {high}"
+
+
+def machine(described: dict[str, Any]) -> str:
+    """'AMD EPYC 7763, 8 CPUs allowed', of the `machine` of a record's context."""
+    cpu = described.get("cpu")
+    words = [str(cpu) if cpu and not str(cpu).startswith("unavailable") else "unknown CPU"]
+    allowed = described.get("cpus_allowed")
+    if isinstance(allowed, list):
+        words.append(count(len(allowed), "CPU") + " allowed")
+    return ", ".join(words)

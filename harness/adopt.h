@@ -66,7 +66,7 @@ class AdoptWorkplace {
 
   /// Runs the program and reads its picture into `pixels`. Throws InputError where it cannot be started, and
   /// Interrupted.
-  JudgedRun run(const RunSetting& setting, bool watch_threads, std::vector<std::uint32_t>& pixels) const;
+  JudgedRun run(const RunSetting& setting, bool watch, std::vector<std::uint32_t>& pixels) const;
 
   /// One run that is neither judged nor timed: what the program asks of its OpenMP runtime.
   ProbeCounts probe(int threads, int& most_threads) const;

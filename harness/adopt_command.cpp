@@ -65,8 +65,12 @@ Json openmp_json(const OpenMpUse& use, const ProgramFile& file, const ProbeCount
 /// Below this a process's start and its files are a large part of its time.
 constexpr double kShortRunMs = 100;
 
+/// From here on others take so much of the machine, in CPUs, that speedups say more of them than of the
+/// program.
+constexpr double kOtherLoad = 0.25;
+
 /// Why more threads do not help, as far as it can be seen from outside.
-std::string why_no_gain(double busy, int threads, const ProbeCounts& probe) {
+std::string why_no_gain(double busy, int threads, const ProbeCounts& probe, double other_load) {
   std::string text = fmt::format("{:.2g} CPUs were busy in the mean", busy);
   const auto count = [&](const char* name) {
     const auto found = probe.find(name);
@@ -79,6 +83,8 @@ std::string why_no_gain(double busy, int threads, const ProbeCounts& probe) {
                ". It entered critical sections or took locks {} times: threads take turns there, and one "
                "waits while another works.",
                turns);
+  if (other_load > kOtherLoad)
+    return text + ", and others had the rest of the machine: measure again where nothing else runs.";
   if (busy < 0.75 * threads)
     return text +
            ": most of the time one thread works alone (reading, transforming or writing in a serial part, or "
@@ -109,6 +115,12 @@ std::vector<std::string> timing_sentences(const Json& timing, const ProbeCounts&
         "That is short: starting a process, reading the model and writing the picture are a large part of "
         "it. For a "
         "report take a larger scene.");
+  const Json& other = timing.at("other_load_cpus");
+  const double other_load = other.is_number() ? other.get<double>() : 0;
+  if (other_load > kOtherLoad)
+    sentences.push_back(fmt::format(
+        "NOISY: other programs kept {:.2g} of {} CPUs busy while this was timed; do not publish these times.",
+        other_load, available_cpus()));
   for (const Json& point : timing.at("points")) {
     if (most == 1 || point.at("threads") != most || point.at("speedup").is_null()) continue;
     std::string text = fmt::format("{}: {:.3g} times as fast as one thread", setting(point),
@@ -121,7 +133,8 @@ std::vector<std::string> timing_sentences(const Json& timing, const ProbeCounts&
       text += fmt::format(" [{:.3g}, {:.3g}]", interval.at(0).get<double>(), high);
       // Not even a quarter of what each further thread could add.
       text += high < 1 + 0.25 * (most - 1)
-                  ? ": it does not scale. " + why_no_gain(point.at("cpus_busy").get<double>(), most, probe)
+                  ? ": it does not scale. " +
+                        why_no_gain(point.at("cpus_busy").get<double>(), most, probe, other_load)
                   : ".";
     }
     sentences.push_back(std::move(text));
@@ -250,10 +263,8 @@ int adopt(AdoptOptions& options) {
     std::vector<std::string> sentences = timing_sentences(*timing, probe);
     result["timing"]["text"] = sentences;
     for (const std::string& sentence : sentences) fmt::print("  {}\n", sentence);
-    std::int64_t memory = 0;
-    for (const Json& point : timing->at("points"))
-      memory = std::max(memory, point.at("max_rss_bytes").get<std::int64_t>());
-    write_file(out / "adopt.sbatch", adopt_slurm_script(options, workplace.program(), *timing, memory));
+    write_file(out / "adopt.sbatch", adopt_slurm_script(options, workplace.program(), *timing,
+                                                        judgement.at("max_rss_bytes").get<std::int64_t>()));
     result["slurm"] = "adopt.sbatch";
     written.push_back("adopt.sbatch");
   } else {
@@ -306,6 +317,11 @@ void add_adopt_command(CLI::App& app, Outcome& outcome) {
       ->capture_default_str()
       ->check(CLI::Range(2, 10000));
   command->add_option("--judge-seconds", o->judge_seconds, "begin no further repetition after this long")
+      ->capture_default_str()
+      ->check(number_check(0, kLongestSeconds));
+  command
+      ->add_option("--race-seconds", o->race_seconds,
+                   "seconds of runs on a scene that is made to provoke races; 0: none")
       ->capture_default_str()
       ->check(number_check(0, kLongestSeconds));
   command

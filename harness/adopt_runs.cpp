@@ -132,10 +132,10 @@ ProgramRun AdoptWorkplace::prepared(const RunSetting& setting) const {
   return run;
 }
 
-JudgedRun AdoptWorkplace::run(const RunSetting& setting, bool watch_threads,
+JudgedRun AdoptWorkplace::run(const RunSetting& setting, bool watch,
                               std::vector<std::uint32_t>& pixels) const {
   ProgramRun run = prepared(setting);
-  run.watch_threads = watch_threads;
+  run.watch = watch;
   JudgedRun judged;
   judged.setting = setting;
   judged.result = run_program(run);
@@ -186,7 +186,7 @@ ProbeCounts AdoptWorkplace::probe(int threads, int& most_threads) const {
     run.variables["LD_PRELOAD"] = library.string();
     run.variables[kProbeVariable] = report.string();
   }
-  run.watch_threads = true;
+  run.watch = true;
   const ProgramResult result = run_program(run);
   if (result.end == RunEnd::kStopped || interrupted) throw Interrupted("interrupted");
   if (result.end == RunEnd::kNotStarted)

@@ -1,8 +1,12 @@
 #include <fmt/format.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <fstream>
+#include <numeric>
 #include <random>
 #include <regex>
 
@@ -15,7 +19,6 @@ namespace {
 struct TimedPoint {
   RunSetting setting;
   std::vector<double> seconds = {}, cpu_seconds = {}, own = {};
-  std::int64_t max_rss_bytes = 0;
 };
 
 Json interval_json(const std::optional<std::pair<double, double>>& interval, double factor) {
@@ -34,6 +37,27 @@ std::vector<double> scaled(const std::vector<double>& values, double factor) {
   return result;
 }
 
+/// CPU seconds that the whole machine has been busy since it started (proc(5), /proc/stat), stolen ones
+/// included.
+std::optional<double> machine_seconds() {
+  std::ifstream file("/proc/stat");
+  std::string word;
+  double user = 0, nice = 0, system = 0, idle = 0, iowait = 0, irq = 0, softirq = 0, steal = 0;
+  if (!(file >> word >> user >> nice >> system >> idle >> iowait >> irq >> softirq >> steal))
+    return std::nullopt;
+  return (user + nice + system + irq + softirq + steal) / static_cast<double>(sysconf(_SC_CLK_TCK));
+}
+
+/// CPU seconds of this process.
+double own_seconds() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& time) {
+    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
 Json point_json(const TimedPoint& point, const TimedPoint* base) {
   Json json{{"threads", point.setting.threads},
             {"schedule", point.setting.schedule.empty() ? Json() : Json(point.setting.schedule)},
@@ -48,7 +72,6 @@ Json point_json(const TimedPoint& point, const TimedPoint* base) {
   for (std::size_t i = 0; i < point.seconds.size(); ++i)
     busy.push_back(point.cpu_seconds[i] / point.seconds[i]);
   json["cpus_busy"] = median(busy);
-  json["max_rss_bytes"] = point.max_rss_bytes;
   json["own_times"] = point.own;
   if (base != nullptr)
     for (std::size_t i = 0; i < point.seconds.size(); ++i)
@@ -73,6 +96,8 @@ std::optional<Json> time_program(const AdoptOptions& options, const std::vector<
   const std::regex own_time(options.own_time);
   std::mt19937_64 random(1);
   const auto begin = std::chrono::steady_clock::now();
+  const std::optional<double> machine_before = machine_seconds();
+  const double own_before = own_seconds();
   std::vector<std::uint32_t> pixels;
   std::string stop;
   for (int block = 0; stop.empty(); ++block) {
@@ -90,7 +115,6 @@ std::optional<Json> time_program(const AdoptOptions& options, const std::vector<
       if (!verdict.is_correct()) return std::nullopt;  // a failed check shows no speed
       point.seconds.push_back(run.result.seconds);
       point.cpu_seconds.push_back(run.result.cpu_seconds);
-      point.max_rss_bytes = std::max(point.max_rss_bytes, run.result.max_rss_bytes);
       std::smatch match;
       if (!options.own_time.empty() && std::regex_search(run.result.output, match, own_time))
         point.own.push_back(std::strtod(match[1].str().c_str(), nullptr));
@@ -117,6 +141,16 @@ std::optional<Json> time_program(const AdoptOptions& options, const std::vector<
       {"target", options.target},
       {"stop", stop},
       {"own_time", options.own_time.empty() ? Json() : Json(options.own_time)}};
+  double programs = 0;
+  for (const TimedPoint& point : points)
+    programs += std::accumulate(point.cpu_seconds.begin(), point.cpu_seconds.end(), 0.0);
+  const double elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  const std::optional<double> machine_after = machine_seconds();
+  timing["other_load_cpus"] =
+      machine_before && machine_after
+          ? Json(std::max(0.0, *machine_after - *machine_before - (own_seconds() - own_before) - programs) /
+                 elapsed)
+          : Json("unavailable: /proc/stat cannot be read");
   for (const TimedPoint& point : points) {
     const auto base = std::find_if(points.begin(), points.end(), [&](const TimedPoint& other) {
       return other.setting.threads == 1 && other.setting.schedule == point.setting.schedule;

@@ -198,7 +198,7 @@ void AdoptVerdict::add_picture_problems(Json& problems, Json& notes, Json& judge
     } else if (!race_threads.empty()) {
       kind = "race";
       text = fmt::format(
-          "The same run gives different pictures: {}; with one thread always the same. {} change. That "
+          "The same run gives different pictures: {}; with one thread always the same ({} affected). That "
           "is a data race: two threads read and write the same pixel at the same time, and one of the "
           "two updates is lost.",
           race_threads, pixels_text(judgement["unstable_pixels"].get<std::int64_t>()));
@@ -253,6 +253,9 @@ Json AdoptVerdict::conclude(const std::filesystem::path& folder, const std::stri
     runs.push_back(std::move(entry));
   }
 
+  std::int64_t memory = 0;
+  for (const JudgedRun& run : runs_) memory = std::max(memory, run.result.max_rss_bytes);
+  judgement["max_rss_bytes"] = memory;
   judgement["nearest"] = Json::array();
   judgement["unstable_pixels"] = 0;
   judgement["pictures"] = Json::array();
@@ -312,8 +315,7 @@ Json AdoptVerdict::conclude(const std::filesystem::path& folder, const std::stri
     }
     if (x1 >= 0) {
       judgement["box"] = {x0, y0, x1 + 1, y1 + 1};
-      Accuracy classes{.pixels = static_cast<std::int64_t>(shown.pixels.size()),
-                       .wrong = shown.findings.differ()};
+      Accuracy classes{.pixels = static_cast<std::int64_t>(shown.pixels.size())};
       for (const PixelFinding finding : shown.findings.pixels) {
         PixelClass kind = PixelClass::kSame;
         if (finding == PixelFinding::kLiteral) kind = PixelClass::kUnbounded;
@@ -327,6 +329,7 @@ Json AdoptVerdict::conclude(const std::filesystem::path& folder, const std::stri
         classes.depth += kind == PixelClass::kDepth;
         classes.unbounded += kind == PixelClass::kUnbounded;
         classes.unexplained += kind == PixelClass::kUnexplained;
+        classes.wrong += kind != PixelClass::kSame;
       }
       const DifferenceImage image = difference_image(classes, judge_.truth(), width_, height_);
       write_image(folder / (prefix + "difference.png"), image.pixels, image.width, image.height);

@@ -72,20 +72,20 @@ def _summary(analysis: Analysis, group: Group, best: dict[str, tuple[str, list[R
     for i, (kernel, (execution, records)) in enumerate(best.items()):
         base = analysis.thread_base[records[-1].id]
         own = {r.config.threads: _self(analysis, r, base) for r in records}
-        _curve(axes[0], own, i)
-        _curve(axes[1], {p: statistics.efficiency(e, p) for p, e in own.items()}, i)
+        curve(axes[0], own, i)
+        curve(axes[1], {p: statistics.efficiency(e, p) for p, e in own.items()}, i)
         limits[0].append(floors.ceilings(floor, analysis.estimates[base.id].value, counts))
         limits[1].append({p: ceiling / p for p, ceiling in limits[0][-1].items()})
         name = f"{kernel}, {execution}: base (b) {seconds(analysis, base)}"
         if serial[kernel] is not None:
             over = {r.config.threads: analysis.speedup(r, serial[kernel]) for r in records}
-            _curve(axes[2], over, i)
+            curve(axes[2], over, i)
             limits[2].append(floors.ceilings(floor, analysis.estimates[serial[kernel].id].value, counts))
             name += f"; base (a) {serial[kernel].config.kernel}, {seconds(analysis, serial[kernel])}"
         look = style.look(i)
         keys.append(Line2D([], [], color=look.colour, marker=look.marker, ms=4, label=name))
     for i, (panel, title) in enumerate(zip(axes, panels)):
-        _thread_axis(panel, counts)
+        thread_axis(panel, counts)
         panel.set_title(title, loc="left", fontsize=8)
         panel.set_ylabel("efficiency (1 = ideal)" if i == 1 else "speedup (times)")
         if i != 1:
@@ -132,7 +132,7 @@ def ratio_kind(analysis: Analysis, records: list[Record]) -> str:
     return " / ".join(sorted(kinds))
 
 
-def _curve(axes: Axes, values: dict[int, Estimate], series: int) -> None:
+def curve(axes: Axes, values: dict[int, Estimate], series: int) -> None:
     # Not set apart sideways: against the ideal line a shift in threads would look like a gain or a loss.
     look = style.look(series)
     x = np.array(list(values), dtype=float)
@@ -144,7 +144,7 @@ def _curve(axes: Axes, values: dict[int, Estimate], series: int) -> None:
     axes.errorbar(x, y, np.maximum(0, [low, high]), color=look.colour, marker=look.marker, ms=4, lw=1.0, elinewidth=1.0)
 
 
-def _thread_axis(axes: Axes, counts: list[int]) -> None:
+def thread_axis(axes: Axes, counts: list[int]) -> None:
     if counts[-1] / counts[0] >= 8:
         axes.set_xscale("log", base=2)
         axes.set_xlim(counts[0] * 0.85, counts[-1] * 1.18)
@@ -180,9 +180,9 @@ def _panels(analysis: Analysis, group: Group, every: dict[tuple[str, str], list[
         for execution, records in lines:
             base = analysis.thread_base[records[-1].id]
             bases.append(analysis.estimates[base.id].value / 1000)
-            _curve(axes, {r.config.threads: _self(analysis, r, base) for r in records}, executions.index(execution))
+            curve(axes, {r.config.threads: _self(analysis, r, base) for r in records}, executions.index(execution))
         axes.plot(counts, counts, color="black", lw=0.8, ls=(0, (4, 2)), zorder=1)
-        _thread_axis(axes, counts)
+        thread_axis(axes, counts)
         low, high = text.number(min(bases)), text.number(max(bases))
         # One line a panel, of the fastest base: its executions differ little on one thread.
         panels.append((axes, floors.ceilings(floor, 1000 * min(bases), counts)))
