@@ -74,10 +74,10 @@ std::vector<char*> pointers(std::vector<std::string>& words) {
 }
 
 /// vfork, not fork: the page tables of a large scene are not copied, which would be in the time. The child
-/// only makes system calls until exec. On the way `*failure` is where it says that exec failed, since memory
-/// is shared.
+/// only makes system calls until exec. Where exec fails it writes the errno to `failure`, which a good exec
+/// closes.
 [[gnu::noinline]] pid_t start(const ProgramRun& run, char* const* argv, char* const* envp, int input,
-                              int output, volatile int* failure) {
+                              int output, int failure) {
   const char* folder = run.folder.c_str();
   const pid_t parent = getpid();
   const pid_t child = vfork();
@@ -96,7 +96,8 @@ std::vector<char*> pointers(std::vector<std::string>& words) {
   dup2(output, STDOUT_FILENO);
   dup2(output, STDERR_FILENO);
   if (chdir(folder) == 0) execve(argv[0], argv, envp);
-  *failure = errno;
+  const int error = errno;
+  [[maybe_unused]] const ssize_t n = write(failure, &error, sizeof error);
   _exit(127);
 }
 
@@ -157,10 +158,14 @@ ProgramResult run_program(const ProgramRun& run) {
   const Descriptor ended(eventfd(0, EFD_CLOEXEC));
   if (nothing.number() < 0 || ended.number() < 0) throw system_error("cannot open what a program needs");
 
+  int failures[2];
+  if (pipe2(failures, O_CLOEXEC | O_NONBLOCK) != 0) throw system_error("cannot make a pipe");
+  const Descriptor failure(failures[0]), failing(failures[1]);
+
   ProgramResult result;
-  volatile int failure = 0;
   const auto begin = Clock::now();
-  const pid_t pid = start(run, argv.data(), envp.data(), nothing.number(), writing.number(), &failure);
+  const pid_t pid =
+      start(run, argv.data(), envp.data(), nothing.number(), writing.number(), failing.number());
   if (pid < 0) throw system_error("cannot start a process");
   writing.close_now();
 
@@ -204,9 +209,9 @@ ProgramResult run_program(const ProgramRun& run) {
   result.seconds = std::chrono::duration<double>(end - begin).count();
   result.cpu_seconds = seconds_of(usage.ru_utime) + seconds_of(usage.ru_stime);
   result.output = output.take();
-  if (failure != 0) {
+  if (int error = 0; read(failure.number(), &error, sizeof error) == sizeof error) {
     result.end = RunEnd::kNotStarted;
-    result.code = failure;
+    result.code = error;
   } else if (killed != RunEnd::kExited && WIFSIGNALED(status)) {
     result.end = killed;
   } else if (WIFSIGNALED(status)) {

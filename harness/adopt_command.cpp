@@ -197,6 +197,8 @@ int adopt(AdoptOptions& options) {
   AdoptVerdict verdict(options, judge, settings.width, settings.height);
   run_judged(options, workplace, verdict, progress);
 
+  for (const char* name : {"races_difference.png", "races_picture.png"})
+    std::filesystem::remove(std::filesystem::path(options.out) / name);
   // What is wrong already needs no provocation.
   const Json races =
       verdict.is_correct() && options.race_seconds > 0 ? provoke_races(options, progress) : Json();
@@ -228,6 +230,9 @@ int adopt(AdoptOptions& options) {
   result["machine"] = describe_machine();
   result["environment"] = {{"binding", options.binding},
                            {"cleared", {"OMP_*", "GOMP_*", "KMP_*", "LD_PRELOAD"}}};
+  // What an earlier run found here must not stand beside what this one finds.
+  for (const char* name : {"adopt.json", "adopt.sbatch", "difference.png", "picture.png"})
+    std::filesystem::remove(out / name);
   result["judgement"] = verdict.conclude(out, "");
   result["races"] = races;
   result["openmp"] = openmp_json(use, file, probe, most_threads);

@@ -82,6 +82,7 @@ std::string advice(const PictureFindings& findings, const WholePicture& whole) {
 
 void AdoptVerdict::add(const JudgedRun& run, const std::vector<std::uint32_t>& pixels) {
   runs_.push_back(run);
+  runs_.back().result.output.clear();  // what matters of it is in `problem`
   if (run.outcome != "ok") return;
   const bool is_new = !pictures_.contains(run.picture);
   Drawn& drawn = pictures_[run.picture];

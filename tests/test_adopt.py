@@ -178,6 +178,13 @@ def test_wrong_pixels(fault: int, finding: str | None, words: str, build: Callab
     assert read_png(tmp_path / judgement["picture"]).shape == (90, 160, 3)
 
 
+def test_an_earlier_result_does_not_stay(build: Callable[..., Path], tmp_path: Path) -> None:
+    adopt(build("rows"), tmp_path, "--schedule", "static", code=0)
+    assert (tmp_path / "adopt.sbatch").exists()
+    adopt(build("faults", "FAULT=5"), tmp_path, code=1)
+    assert {p.name for p in tmp_path.iterdir()} == {"adopt.json", "difference.png", "picture.png"}
+
+
 def test_some_wrong_pixels_can_be_let_pass(build: Callable[..., Path], tmp_path: Path) -> None:
     adopt(build("faults", "FAULT=5"), tmp_path, "--max-wrong", 64, "--race-seconds", 0, code=0)
 

@@ -13,7 +13,7 @@ int main(int, char** argv) {
   if (fault == 2)                                                    // the farthest triangle wins
     for (course::Screen& t : job.triangles)
       for (double& d : t.d) d = -d;
-  if (fault == 3)  // shaded by |n.L|, and rounded up
+  if (fault == 3)  // another shading
     for (course::Screen& t : job.triangles)
       t.colour.r = static_cast<unsigned char>(std::min(255, t.colour.r + 9));
   course::Image image(job);
@@ -25,7 +25,7 @@ int main(int, char** argv) {
   if (fault == 5)  // a tile that nobody wrote
     for (int y = 8; y < 16; ++y)
       for (int x = 40; x < 48; ++x) image.colours[image.at(x, y)] = {0, 0, 0};
-  if (fault == 6)  // one triangle is left out, and each row depends on the number of threads
+  if (fault == 6)  // blank: the row whose number is that of the threads
     for (int x = 0; x < job.width; ++x) image.colours[image.at(x, omp_get_max_threads())] = job.background;
   course::write_ppm(argv[3], job, image);
 }
