@@ -66,9 +66,10 @@ std::string advice(const PictureFindings& findings, const WholePicture& whole) {
              "that are "
              "culled (the contract draws them, black), triangles that cross the near plane.";
     case PixelFinding::kOutside:
-      return "Look at the inside test: all three edge functions must have the same sign; two of them accept "
-             "points "
-             "beyond the third edge.";
+      return "Look at the inside test (all three edge functions must have the same sign; two of them accept "
+             "points beyond the third edge) and at where it is asked: at the centre of a pixel, (column + "
+             "0.5, "
+             "row + 0.5).";
     case PixelFinding::kUnwritten:
       return "Look for pixels that are never written: the picture must be filled with the background first.";
     default:
@@ -199,7 +200,8 @@ void AdoptVerdict::add_picture_problems(Json& problems, Json& notes, Json& judge
     } else if (!race_threads.empty()) {
       kind = "race";
       text = fmt::format(
-          "The same run gives different pictures: {}; with one thread always the same ({} affected). That "
+          "The same run gives different pictures: {}; with one thread always the same ({} in all differ). "
+          "That "
           "is a data race: two threads read and write the same pixel at the same time, and one of the "
           "two updates is lost.",
           race_threads, pixels_text(judgement["unstable_pixels"].get<std::int64_t>()));

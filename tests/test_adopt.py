@@ -12,7 +12,7 @@ from typing import Any, Callable
 
 import pytest
 
-from .program import CPUS, ROOT, command, environment, program, read_png, refused, run
+from .program import CPUS, ROOT, Parameters, command, environment, program, read_png, refused, run, write_dat
 
 SOURCES = ROOT / "tests/programs"
 # Small and quick: what is tested is the judgement, not the times.
@@ -161,10 +161,10 @@ def test_a_crash_with_threads(build: Callable[..., Path], tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("fault, finding, words", [
-    (2, "hidden", "depth test"), (3, "colour", "shading"), (4, None, "upside down"), (5, "unwritten", "never written"),
-], ids=["farthest wins", "other shading", "upside down", "a tile left black"])
+    (2, "hidden", "depth test"), (3, "colour", "shading"), (4, None, "upside down"), (5, "unwritten", "never written"), (7, None, "row + 0.5"),
+], ids=["farthest wins", "other shading", "upside down", "a tile left black", "samples at corners"])
 def test_wrong_pixels(fault: int, finding: str | None, words: str, build: Callable[..., Path], tmp_path: Path) -> None:
-    result, said = adopt(build("faults", f"FAULT={fault}"), tmp_path, code=1)
+    result, said = adopt(build("faults", f"FAULT={fault}"), tmp_path, code=1, model="teapot:triangles=3000" if fault == 7 else MODEL)
     judgement = result["judgement"]
     assert kinds(judgement) == ["wrong_pixels"] and words in said
     (picture,) = judgement["pictures"]
@@ -176,6 +176,17 @@ def test_wrong_pixels(fault: int, finding: str | None, words: str, build: Callab
         assert judgement["first_pixels"][0] | {"x": 40, "y": 8, "drawn": "#000000"} == judgement["first_pixels"][0]
     assert read_png(tmp_path / judgement["difference"]).shape[1] == 160
     assert read_png(tmp_path / judgement["picture"]).shape == (90, 160, 3)
+
+
+def test_a_fill_rule_that_tears_neighbours_apart(build: Callable[..., Path], tmp_path: Path) -> None:
+    """The diagonal of a square runs through samples: a matter of the fill rule, which rounding may excuse, but which is said."""
+    square = write_dat(tmp_path / "square.dat", [[-.5, -.5, 0, .5, -.5, 0, .5, .5, 0], [-.5, -.5, 0, .5, .5, 0, -.5, .5, 0]])
+    scene = Parameters(camera=(0, 0, 4), height=64, width=64, theta=0.48995732625372834, near=1, far=10).write(tmp_path / "square.txt")
+    for definitions, differing in (((), 0), (("OPEN_EDGES",), 32)):
+        outcome = run("adopt", build("rows", *definitions), square, scene, "--out", tmp_path / "out", *quick("--size", "64x64")).ok()
+        (picture,) = json.loads((tmp_path / "out/adopt.json").read_text())["judgement"]["pictures"]
+        assert picture["differ"] == picture["pixels"]["edge_float64"] == differing and picture["wrong"] == 0
+        assert ("tears neighbours apart" in outcome.stdout) == (differing > 0)
 
 
 def test_an_earlier_result_does_not_stay(build: Callable[..., Path], tmp_path: Path) -> None:

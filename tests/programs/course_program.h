@@ -111,7 +111,11 @@ inline double depth_at(const Screen& t, int x, int y) {
   const double area = e[0] + e[1] + e[2];
   if (area == 0) return 2;
   for (double& value : e) value /= area;
+#ifdef OPEN_EDGES  // not the contract's fill rule: a sample on an edge belongs to nobody
+  if (e[0] <= 0 || e[1] <= 0 || e[2] <= 0) return 2;
+#else
   if (e[0] < 0 || e[1] < 0 || e[2] < 0) return 2;
+#endif
   return e[0] * t.d[0] + e[1] * t.d[1] + e[2] * t.d[2];
 }
 

@@ -16,6 +16,9 @@ int main(int, char** argv) {
   if (fault == 3)  // another shading
     for (course::Screen& t : job.triangles)
       t.colour.r = static_cast<unsigned char>(std::min(255, t.colour.r + 9));
+  if (fault == 7)  // samples at the corners of pixels
+    for (course::Screen& t : job.triangles)
+      for (int i = 0; i < 3; ++i) t.x[i] += 0.5, t.y[i] += 0.5;
   course::Image image(job);
   for (int y = 0; y < job.height; ++y) course::draw_row(job, image, y);
   if (fault == 4)  // upside down
