@@ -9,6 +9,7 @@
 #include "pipeline/resolve.h"
 #include "reference/end_to_end.h"
 #include "reference/footprint.h"
+#include "reference/judge.h"
 #include "reference/specification.h"
 
 namespace rasterbench {
@@ -37,16 +38,6 @@ int channel(std::uint32_t colour, int shift) { return static_cast<int>(colour >>
 bool alike(std::uint32_t a, std::uint32_t b) {
   return std::abs(channel(a, 0) - channel(b, 0)) <= 1 && std::abs(channel(a, 8) - channel(b, 8)) <= 1 &&
          std::abs(channel(a, 16) - channel(b, 16)) <= 1;
-}
-
-std::vector<std::uint32_t> shaded(std::span<const std::int32_t> ids, const Scene& scene) {
-  std::vector<std::uint32_t> colours;
-  colours.reserve(ids.size());
-  for (const std::int32_t id : ids)
-    colours.push_back(
-        id < 0 ? pack_rgba(scene.parameters.background)
-               : shade_flat(scene.model.triangles[static_cast<std::size_t>(id)], scene.parameters.object));
-  return colours;
 }
 
 double row_at(const AffineRow& row, const Vec3& p) {
@@ -253,9 +244,9 @@ PictureJudge::PictureJudge(const Scene& scene, const FrameSettings& settings, in
   };
   EndToEndTruth own = truth(settings_.fill);
   owners_ = std::move(own.truth.ids);
-  truth_ = shaded(owners_, scene);
+  truth_ = shade_owners(owners_, scene);
   for (const DecidedBy decided : own.decided) ambiguous_.push_back(decided == DecidedBy::kAmbiguous);
-  other_fill_ = shaded(
+  other_fill_ = shade_owners(
       truth(settings_.fill == FillRule::kClosed ? FillRule::kTopLeft : FillRule::kClosed).truth.ids, scene);
 }
 PictureJudge::~PictureJudge() = default;

@@ -29,7 +29,7 @@ fs::path program_file(const std::string& program) {
   if (!fs::is_regular_file(status)) throw InputError({.file = program}, "is not a file that can be run");
   if (access(program.c_str(), X_OK) != 0)
     throw InputError({.file = program}, fmt::format("cannot be run: {} (chmod +x?)", std::strerror(errno)));
-  return fs::canonical(program);
+  return fs::absolute(program).lexically_normal();
 }
 
 /// The picture of a run: the file that was asked for, or another PPM that the program wrote into its folder.

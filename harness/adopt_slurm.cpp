@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 
 #include "build_info.h"
@@ -16,6 +17,13 @@ std::string quoted(const std::string& text) {
   std::string result = "'";
   for (const char c : text) result += c == '\'' ? std::string("'\\''") : std::string(1, c);
   return result + "'";
+}
+
+/// For a comment and a job's name, which end at the line or at a space.
+std::string plain_name(std::string name) {
+  for (char& c : name)
+    if (!std::isalnum(static_cast<unsigned char>(c)) && c != '-' && c != '_' && c != '.') c = '_';
+  return name;
 }
 
 std::string absolute_file(const std::string& name) {
@@ -43,13 +51,15 @@ std::string adopt_slurm_script(const AdoptOptions& options, const fs::path& prog
   if (options.near_rule != "clip") words += " --near " + quoted(options.near_rule);
   if (!options.own_time.empty()) words += " --own-time " + quoted(options.own_time);
   if (options.max_wrong > 0) words += fmt::format(" --max-wrong {}", options.max_wrong);
-  words +=
-      fmt::format(" --limit {:g} --judge-seconds {:g} --seconds {:g} --max-samples {} --target {:g}",
-                  options.limit, options.judge_seconds, options.seconds, options.max_samples, options.target);
+  words += fmt::format(
+      " --limit {:g} --judge-seconds {:g} --race-seconds {:g} --seconds {:g} --max-samples {} --target {:g}",
+      options.limit, options.judge_seconds, options.race_seconds, options.seconds, options.max_samples,
+      options.target);
 
-  // The two budgets, one run beyond each, the judge's own work, and half as much again.
+  // The three budgets, one run beyond each, the judge's own work, and half as much again.
   const int minutes =
-      static_cast<int>(std::ceil(1.5 * (options.judge_seconds + options.seconds + 2 * options.limit) / 60)) +
+      static_cast<int>(std::ceil(
+          1.5 * (options.judge_seconds + options.race_seconds + options.seconds + 3 * options.limit) / 60)) +
       5;
   // The program's memory and the judge's.
   const std::int64_t megabytes = std::max<std::int64_t>(2048, 2 * (max_rss_bytes >> 20) + 1024);
@@ -84,7 +94,7 @@ srun --cpu-bind=cores -c "$SLURM_CPUS_PER_TASK" \
   "$rasterbench" adopt "$program" "$model" ${{scene:+"$scene"}} --out "$out-$SLURM_JOB_ID" \
   --threads {threads} --binding close{words}
 )",
-      fmt::arg("name", program.stem().string()), fmt::arg("version", build_info::kVersion),
+      fmt::arg("name", plain_name(program.stem().string())), fmt::arg("version", build_info::kVersion),
       fmt::arg("cores", options.slurm_cores), fmt::arg("memory", megabytes), fmt::arg("minutes", minutes),
       fmt::arg("self", quoted(self.string())), fmt::arg("program", quoted(program.string())),
       fmt::arg("model", quoted(absolute_file(options.model))),

@@ -34,7 +34,11 @@ std::vector<ScreenTriangle<float>> snapped(std::vector<ScreenTriangle<float>> tr
   return triangles;
 }
 
-std::vector<std::uint32_t> shaded(std::span<const std::int32_t> ids, const Scene& scene) {
+JudgedPicture judged(const Picture& picture) { return {picture.ids, picture.values, picture.colours}; }
+
+}  // namespace
+
+std::vector<std::uint32_t> shade_owners(std::span<const std::int32_t> ids, const Scene& scene) {
   std::vector<std::uint32_t> colours;
   colours.reserve(ids.size());
   for (const std::int32_t id : ids)
@@ -43,10 +47,6 @@ std::vector<std::uint32_t> shaded(std::span<const std::int32_t> ids, const Scene
                : shade_flat(scene.model.triangles[static_cast<std::size_t>(id)], scene.parameters.object));
   return colours;
 }
-
-JudgedPicture judged(const Picture& picture) { return {picture.ids, picture.values, picture.colours}; }
-
-}  // namespace
 
 Judge::Judge(const Scene& scene, const FrameSettings& settings, int threads)
     : scene_(scene), settings_(settings), camera_(sized_camera(scene, settings)), threads_(threads) {
@@ -73,7 +73,7 @@ Judge::Screen<Real>& Judge::screen(const ModeInfo& mode) {
                             settings_.geometry, slot->triangles.data(), extra, counts);
   slot->triangles.insert(slot->triangles.end(), extra.begin(), extra.end());
   slot->oracle = exact_owners(input<Real>(mode), threads_);
-  slot->colours = shaded(slot->oracle.ids, scene_);
+  slot->colours = shade_owners(slot->oracle.ids, scene_);
   return *slot;
 }
 
@@ -105,7 +105,7 @@ Accuracy Judge::against_snapped_oracle(const Picture& picture, const ModeInfo& m
   const OracleImage oracle = exact_owners(on_grid, threads_);
   ModeBound bound = mode.numbers;
   bound.snap = 0;
-  return measure_accuracy(judged(picture), on_grid, oracle, shaded(oracle.ids, scene_), camera_, bound,
+  return measure_accuracy(judged(picture), on_grid, oracle, shade_owners(oracle.ids, scene_), camera_, bound,
                           threads_);
 }
 

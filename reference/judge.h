@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -32,6 +33,9 @@ struct EndToEndVerdict {
   std::int64_t worst_pixel = -1;     ///< the first error, or -1
   std::int64_t wrong() const { return edge_ties + depth_ties + unbounded + errors; }
 };
+
+/// The colours of a picture with these owners (-1: background), shaded by the contract.
+std::vector<std::uint32_t> shade_owners(std::span<const std::int32_t> ids, const Scene& scene);
 
 /// Judges pictures of one scene at one size, fill rule, tie rule and near rule. The scene must outlive it.
 class Judge {

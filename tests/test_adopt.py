@@ -283,9 +283,11 @@ def test_the_environment_is_that_of_the_point(build: Callable[..., Path], script
 # The SLURM script.
 
 def test_slurm_script(build: Callable[..., Path], tmp_path: Path) -> None:
-    """It parses, asks for cores, memory and time, and what it runs works (srun is played by a shell function's stand-in)."""
+    """It parses, asks for cores, memory and time, and what it runs works (a script stands in for srun)."""
     out = tmp_path / "it's here"
-    adopt(build("rows"), out, "--slurm-cores", CPUS, "--schedule", "static", code=0)
+    odd = tmp_path / "my program; echo"
+    odd.symlink_to(build("rows"))
+    adopt(odd, out, "--slurm-cores", CPUS, "--schedule", "static", code=0)
     batch = out / "adopt.sbatch"
     text = batch.read_text()
     for words in (f"#SBATCH --cpus-per-task={CPUS}", "#SBATCH --mem=", "#SBATCH --time=", "--cpu-bind=cores -c"):

@@ -26,7 +26,7 @@ def points(seconds: dict[tuple[str | None, int], float], n: int = 12, noise: flo
 
 def result(seconds: dict[tuple[str | None, int], float] | None = None, **timing: Any) -> dict[str, Any]:
     seconds = seconds or {("static", 1): 1.0, ("static", 2): 0.8, ("dynamic,1", 1): 1.0, ("dynamic,1", 2): 0.5}
-    return {"schema": 1, "program": {"path": "/home/me/graphics"}, "scene": {"model": "/data/car.dat", "size": [640, 480]},
+    return {"schema": 1, "program": {"path": "/data/graphics"}, "scene": {"model": "/data/car.dat", "size": [640, 480]},
             "machine": {"cpu": "A CPU", "cpus_allowed": [0, 1]},
             "timing": {"region": "the whole process", "stop": "target", "other_load_cpus": 0.01, "points": points(seconds)} | timing}
 
