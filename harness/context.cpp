@@ -140,6 +140,8 @@ Json describe_context(const Study& study, const StudyOptions& options,
   if (sampling.frame_seconds > 0) context["study"]["sampling"]["frame_seconds"] = sampling.frame_seconds;
   context["overrides"] = {
       {"scenes", options.scenes}, {"sizes", options.sizes}, {"oversubscribe", options.oversubscribe}};
+  if (options.cpus) context["overrides"]["cpus"] = *options.cpus;
+  if (options.isa) context["overrides"]["isa"] = to_string(*options.isa);
   for (const PlannedPoint& planned : study.points) {
     const SceneReference& scene = planned.point.scene;
     context["scenes"][scene.name] = {{"model", scene.model},

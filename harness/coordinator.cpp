@@ -252,10 +252,10 @@ class Coordinator {
   /// Points to sample in the next block: those that have not stopped, and the bases that these are compared
   /// with.
   std::vector<PointState*> next_block() {
-    std::map<std::string, bool> open_comparison, open_family, open_trade;
+    std::map<std::string, bool> open_comparison, open_curve, open_trade;
     for (const PointState& state : states_)
       if (state.open())
-        open_comparison[comparison_of(state.planned->point)] = open_family[family_of(state.planned->point)] =
+        open_comparison[comparison_of(state.planned->point)] = open_curve[curve_of(state.planned->point)] =
             open_trade[trade_of(state.planned->point)] = true;
     const auto fastest = fastest_serial();
     std::vector<PointState*> block;
@@ -265,7 +265,7 @@ class Coordinator {
       const auto base = fastest.find(comparison_of(point));
       const bool is_base =
           (base != fastest.end() && base->second == &state && open_comparison[comparison_of(point)]) ||
-          (point.execution.threads == 1 && !is_peer(point) && open_family[family_of(point)]) ||
+          (point.execution.threads == 1 && !is_peer(point) && open_curve[curve_of(point)]) ||
           (is_literal_program(point) && open_trade[trade_of(point)]);
       if (state.open() || is_base) block.push_back(&state);
     }

@@ -32,6 +32,13 @@ Json per_thread(const PointState& state) {
   return threads;
 }
 
+/// What decides how points are sampled; the time limit is not in it, so that --resume may give more time.
+Json sampling_of(const Study& study) {
+  const SamplingPlan& plan = study.sampling;
+  return {plan.target,   plan.min_samples, plan.max_samples,  plan.point_seconds,
+          plan.launches, study.seed,       plan.frame_seconds};
+}
+
 }  // namespace
 
 std::vector<double> PointState::times_ms() const {
@@ -53,6 +60,17 @@ std::vector<PointState> initial_states(const Study& study, const std::string& bu
   return states;
 }
 
+std::string family_id(const Study& study, const std::vector<PointState>& states) {
+  std::string plan = study.name + dump(sampling_of(study));
+  for (const PointState& state : states) {
+    if (state.planned->family != states.front().planned->family)
+      throw InputError({.field = "--family"},
+                       fmt::format("needs --shard I/{}, which has one family each", study.families));
+    plan += state.id;
+  }
+  return hash_bytes(plan);
+}
+
 Json start_event(const Study& study, const std::vector<PointState>& states, const std::string& build) {
   std::string plan;
   for (const PointState& state : states) plan += state.id + state.skip + "\n";
@@ -63,9 +81,7 @@ Json start_event(const Study& study, const std::vector<PointState>& states, cons
   event["build"] = build;
   event["scenes"] = study.hashes;
   event["plan"] = hash_bytes(plan);
-  event["sampling"] = {study.sampling.target,        study.sampling.min_samples, study.sampling.max_samples,
-                       study.sampling.point_seconds, study.sampling.launches,    study.seed,
-                       study.sampling.frame_seconds};
+  event["sampling"] = sampling_of(study);
   return event;
 }
 

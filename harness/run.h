@@ -40,6 +40,11 @@ struct PointState {
 /// The states of a study's points, in their order.
 std::vector<PointState> initial_states(const Study& study, const std::string& build);
 
+/// What a family measures, as a hash: the ids of its points and how the study samples them. Equal on every
+/// machine that plans for the same CPUs and instruction set. Throws InputError where `study` does not have
+/// the whole of one family and nothing else.
+std::string family_id(const Study& study, const std::vector<PointState>& states);
+
 /// What --resume compares: the build, the plan (ids of all points) and how it is sampled.
 Json start_event(const Study& study, const std::vector<PointState>& states, const std::string& build);
 

@@ -19,11 +19,11 @@ namespace {
 constexpr double kSecondsPerTest = 1.0e-9;
 
 /// Why a point will not run, or empty.
-std::string reason_to_skip(const Point& point, const Scene& scene, const SamplingPlan& sampling,
+std::string reason_to_skip(const Point& point, const Scene& scene, const SamplingPlan& sampling, int cpus,
                            bool oversubscribe) {
-  const bool too_many_threads = point.execution.threads > available_cpus() && !oversubscribe;
+  const bool too_many_threads = point.execution.threads > cpus && !oversubscribe;
   const std::string too_many =
-      fmt::format("{} threads on {} CPUs needs --oversubscribe", point.execution.threads, available_cpus());
+      fmt::format("{} threads on {} CPUs needs --oversubscribe", point.execution.threads, cpus);
   if (is_peer(point)) return !has_llvmpipe() ? llvmpipe_missing() : too_many_threads ? too_many : "";
   const Kernel& kernel = find_kernel(point.kernel);
   const Kernel::Variant& variant = kernel.variant(point.numeric);
@@ -59,6 +59,13 @@ std::string picture_of(const Point& point) {
   return fmt::format("{}/{}x{}", point.scene.name, point.width, point.height);
 }
 
+/// `point` with the same instruction set as any other: a report compares those of one picture, too.
+Point without_isa(const Point& point) {
+  Point common = point;
+  common.isa = Point().isa;
+  return common;
+}
+
 /// The place of `name` in `seen`, where it is put if it is new.
 std::size_t index_of(const std::string& name, std::vector<std::string>& seen) {
   const auto found = std::find(seen.begin(), seen.end(), name);
@@ -91,16 +98,17 @@ bool is_literal_program(const Point& point) {
          (point.kernel == "bounding_box" || point.kernel == "all_pixels");
 }
 
-std::string family_of(const Point& point) {
-  Point family = point;
-  family.execution.threads = 0;
-  return point_name(family);
+std::string curve_of(const Point& point) {
+  Point curve = point;
+  curve.execution.threads = 0;
+  return point_name(curve);
 }
 
 Study read_study(const std::filesystem::path& file, const StudyOptions& options) {
   Study study = read_study_file(file);
   if (options.time_limit) study.sampling.time_limit = *options.time_limit;
-  const std::vector<Sweep> sweeps = read_sweeps(file, study.text, options.scenes, options.sizes);
+  const PlanTarget target{options.cpus.value_or(available_cpus()), options.isa.value_or(best_isa())};
+  const std::vector<Sweep> sweeps = read_sweeps(file, study.text, target, options.scenes, options.sizes);
 
   std::set<std::string> names, trades, pictures;  // trades with a literal program, pictures with a peer
   std::vector<PlannedPoint> all;
@@ -130,30 +138,32 @@ Study read_study(const std::filesystem::path& file, const StudyOptions& options)
       if (options.filter && std::regex_search(planned.name, *options.filter) == options.filter_excludes)
         return;
       if (is_peer(point)) pictures.insert(picture_of(point));
-      if (is_literal_program(point)) trades.insert(trade_of(point));
+      if (is_literal_program(point)) trades.insert(trade_of(without_isa(point)));
       all.push_back(std::move(planned));
     });
   }
-  std::vector<std::string> comparisons;
+  std::vector<std::string> families;
   for (PlannedPoint& planned : all) {
     const Point& point = planned.point;
-    const std::string trade = trade_of(point);
+    const std::string trade = trade_of(without_isa(point));
     const std::string picture = picture_of(point);
-    const std::size_t comparison = index_of(pictures.contains(picture) ? picture
-                                            : trades.contains(trade)   ? trade
-                                                                       : comparison_of(point),
-                                            comparisons);
-    if (comparison % static_cast<std::size_t>(options.shards) != static_cast<std::size_t>(options.shard - 1))
+    planned.family = index_of(pictures.contains(picture) ? picture
+                              : trades.contains(trade)   ? trade
+                                                         : comparison_of(without_isa(point)),
+                              families);
+    if (planned.family % static_cast<std::size_t>(options.shards) !=
+        static_cast<std::size_t>(options.shard - 1))
       continue;
-    planned.skip =
-        reason_to_skip(point, study.scenes.at(point.scene.name), study.sampling, options.oversubscribe);
+    planned.skip = reason_to_skip(point, study.scenes.at(point.scene.name), study.sampling, target.cpus,
+                                  options.oversubscribe);
     study.points.push_back(std::move(planned));
   }
-  if (static_cast<std::size_t>(options.shards) > comparisons.size() && !comparisons.empty())
+  study.families = families.size();
+  if (static_cast<std::size_t>(options.shards) > families.size() && !families.empty())
     throw InputError(
         {.field = "--shard"},
         fmt::format("this study has {} comparison{} that must stay whole: use at most as many shards",
-                    comparisons.size(), comparisons.size() == 1 ? "" : "s"));
+                    families.size(), families.size() == 1 ? "" : "s"));
   return study;
 }
 

@@ -27,7 +27,8 @@ struct SamplingPlan {
 struct PlannedPoint {
   Point point;
   std::string name;
-  std::string skip;  ///< the reason, or empty
+  std::string skip;        ///< the reason, or empty
+  std::size_t family = 0;  ///< of Study::families, from 0: see read_study()
 };
 
 struct Study {
@@ -38,6 +39,7 @@ struct Study {
   std::uint64_t seed = 1;
   SamplingPlan sampling;
   std::vector<PlannedPoint> points;
+  std::size_t families = 0;                   ///< of the whole study, whatever the shard
   std::map<std::string, Scene> scenes;        ///< by SceneReference::name
   std::map<std::string, std::string> hashes;  ///< scene_hash, by the same name
 };
@@ -51,16 +53,20 @@ struct StudyOptions {
   int shard = 1, shards = 1;     ///< this process runs shard 1 .. shards
   std::optional<double> time_limit;
   bool oversubscribe = false;
+  std::optional<int> cpus;  ///< plan for this many CPUs: what "max" means, in place of this process's
+  std::optional<Isa> isa;   ///< plan for this instruction set: what "best" means, in place of this CPU's
 };
 
 /// Reads a study file and spans its points: the cross product of each [[sweep]], duplicates dropped. Opens
 /// every scene. Unknown keys, names and values are InputErrors that name file, line and key, with a
 /// did-you-mean. Paths of models in the file are relative to it.
+///
+/// Points are parted into families, and shards hold whole ones, so that a speedup never compares two
+/// machines: a family is a comparison, bases included, with all instruction sets (where there is a literal
+/// program, all of its trade; where there is a peer, all of its scene and size).
 Study read_study(const std::filesystem::path& file, const StudyOptions& options);
 
 /// What `point` is compared with: equal for points that differ only in strategy, execution and environment.
-/// Shards hold whole comparisons, bases included (where there is a literal program, all of its trade; where
-/// there is a peer, all of its scene and size), so that a speedup never compares two machines.
 std::string comparison_of(const Point& point);
 
 /// comparison_of() without the numeric mode: what the literal program is the base of.
@@ -71,7 +77,7 @@ std::string trade_of(const Point& point);
 bool is_literal_program(const Point& point);
 
 /// Equal for points that differ only in threads: the others are one curve over them.
-std::string family_of(const Point& point);
+std::string curve_of(const Point& point);
 
 /// The study files that come with the program: those in `studies/` of the source tree it was built from, if
 /// it is there.

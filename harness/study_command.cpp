@@ -1,13 +1,17 @@
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 
 #include "base/error.h"
+#include "base/hash.h"
 #include "base/suggest.h"
 #include "harness/commands.h"
+#include "harness/context.h"
 #include "harness/coordinator.h"
 #include "harness/option_checks.h"
+#include "harness/run.h"
 #include "harness/runner.h"
 #include "scene/image.h"
 
@@ -15,10 +19,11 @@ namespace rasterbench {
 namespace {
 
 struct StudyArguments {
-  std::string file, out, filter, shard;
+  std::string file, out, filter, shard, family, isa;
   std::vector<std::string> scenes, sizes;
-  bool resume = false, replace = false, dry_run = false, list = false, oversubscribe = false;
+  bool resume = false, replace = false, dry_run = false, list = false, json = false, oversubscribe = false;
   double time_limit = -1;
+  int cpus = 0;
 };
 
 std::regex parse_regex(const std::string& text, const std::string& field) {
@@ -150,6 +155,70 @@ void print_plan(const Study& study, bool names_only) {
       s.time_limit > 0 ? fmt::format("at most {:g} s in all", s.time_limit) : std::string("no time limit"));
 }
 
+/// The threads of the largest point that will run.
+int most_threads(const std::vector<PlannedPoint>& points) {
+  int most = 1;
+  for (const PlannedPoint& planned : points)
+    if (planned.skip.empty()) most = std::max(most, planned.point.execution.threads);
+  return most;
+}
+
+/// The plan as one object, by family: what a job array is made of (records.md).
+void print_plan_as_json(const Study& study, const StudyOptions& options) {
+  std::map<std::size_t, Study> families;
+  for (const PlannedPoint& planned : study.points) {
+    Study& family = families[planned.family];
+    family.name = study.name;
+    family.seed = study.seed;
+    family.sampling = study.sampling;
+    family.hashes = study.hashes;
+    family.families = study.families;
+    family.points.push_back(planned);
+  }
+  Json plan;
+  plan["schema"] = 1;
+  plan["study"] = study.name;
+  plan["file"] = study.file;
+  plan["hash"] = hash_bytes(study.text);
+  plan["build_id"] = build_id();
+  plan["cpus"] = options.cpus.value_or(available_cpus());
+  plan["isa"] = to_string(options.isa.value_or(best_isa()));
+  plan["families"] = Json::array();
+  for (const auto& [number, family] : families) {
+    const std::vector<PointState> states = initial_states(family, plan["build_id"]);
+    Json points = Json::array();
+    for (const PointState& state : states)
+      points.push_back({{"id", state.id},
+                        {"name", state.planned->name},
+                        {"threads", state.planned->point.execution.threads},
+                        {"skip", state.skip.empty() ? Json() : Json(state.skip)}});
+    plan["families"].push_back({{"id", family_id(family, states)},
+                                {"shard", fmt::format("{}/{}", number + 1, study.families)},
+                                {"threads", most_threads(family.points)},
+                                {"points", points}});
+  }
+  fmt::print("{}\n", dump(plan, 1));
+}
+
+/// What was planned for another machine must be what this one can run: a job that was given too few CPUs, or
+/// a lesser CPU, would skip its points and call them done.
+void check_target(const Study& study, const StudyOptions& options, const std::string& family) {
+  if (options.isa && !is_supported(*options.isa))
+    throw InputError({.field = "--isa"}, fmt::format("this CPU has no {}", to_string(*options.isa)));
+  if (const int needed = most_threads(study.points);
+      options.cpus && needed > available_cpus() && !options.oversubscribe)
+    throw InputError(
+        {.field = "--cpus"},
+        fmt::format("{} threads are planned and this process may use {} CPU{}: needs --oversubscribe", needed,
+                    available_cpus(), available_cpus() == 1 ? "" : "s"));
+  if (family.empty() || study.points.empty()) return;
+  if (const std::string id = family_id(study, initial_states(study, build_id())); id != family)
+    throw InputError({.field = "--family"},
+                     fmt::format("this is {}: the study, a scene, the program or its options are not those "
+                                 "that {} was planned with",
+                                 id, family));
+}
+
 }  // namespace
 
 void add_study_command(CLI::App& app, Outcome& outcome, const std::vector<std::string>& benchmark_flags) {
@@ -165,8 +234,14 @@ void add_study_command(CLI::App& app, Outcome& outcome, const std::vector<std::s
       ->add_option("--size", a->sizes, "WxH in place of the study's sizes; may be repeated")
 
       ->allow_extra_args(false);
-  command->add_option("--shard", a->shard,
-                      "I/N: only the I-th of N parts; points that differ in threads stay together");
+  command->add_option("--shard", a->shard, "I/N: only the I-th of N parts; what is compared stays together");
+  command->add_option("--family", a->family,
+                      "refuse to run unless the shard is this family of --list --json, and nothing else");
+  command
+      ->add_option("--cpus", a->cpus, "plan for N CPUs: what \"max\" means (default: those of this process)")
+      ->check(number_check(1, 65536));
+  command->add_option("--isa", a->isa,
+                      "plan for this instruction set: what \"best\" means (default: this CPU's)");
   command->add_flag("--resume", a->resume, "continue an interrupted study from its journal");
   command
       ->add_flag("--replace", a->replace,
@@ -174,6 +249,8 @@ void add_study_command(CLI::App& app, Outcome& outcome, const std::vector<std::s
       ->excludes("--resume");
   command->add_flag("--dry-run", a->dry_run, "print the points and what would be skipped, run nothing");
   command->add_flag("--list", a->list, "print the names of the points only");
+  command->add_flag("--json", a->json, "with --list: the families of the study and the ids of their points")
+      ->needs("--list");
   command->add_option("--filter", a->filter,
                       "only points whose name this regular expression matches; -REGEX: does not match");
   command
@@ -193,6 +270,8 @@ void add_study_command(CLI::App& app, Outcome& outcome, const std::vector<std::s
     options.sizes = a->sizes;
     options.oversubscribe = a->oversubscribe;
     if (a->time_limit >= 0) options.time_limit = a->time_limit;
+    if (a->cpus > 0) options.cpus = a->cpus;
+    if (!a->isa.empty()) options.isa = parse_isa(a->isa, "--isa");
     if (!a->shard.empty()) parse_shard(a->shard, options);
     if (!a->filter.empty()) {
       options.filter_excludes = a->filter.front() == '-';  // as in Google Benchmark
@@ -200,7 +279,9 @@ void add_study_command(CLI::App& app, Outcome& outcome, const std::vector<std::s
     }
     Study study = read_study(a->file, options);
     apply_benchmark_flags(benchmark_flags, *a, &study, coordinator);
+    if (a->json) return print_plan_as_json(study, options);
     if (a->list || a->dry_run) return print_plan(study, a->list);
+    check_target(study, options, a->family);
     coordinator.out = a->out.empty() ? "results/" + study.name : a->out;
     if (!coordinator.out.has_filename()) coordinator.out = coordinator.out.parent_path();  // DIR/ means DIR
     if (std::filesystem::exists(coordinator.out) && a->replace)

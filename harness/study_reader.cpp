@@ -149,9 +149,8 @@ SceneReference relative_to(SceneReference scene, const std::filesystem::path& fo
   return scene;
 }
 
-/// 1, 2, "max", "1..max": every count up to eight CPUs, then powers of two and the largest.
-std::vector<int> parse_threads(const std::string& text) {
-  const int max = available_cpus();
+/// "max", "1..max": every count up to eight CPUs, then powers of two and the largest.
+std::vector<int> parse_threads(const std::string& text, int max) {
   if (text == "max") return {max};
   if (text != "1..max")
     throw InputError(unknown_name("value", text, std::vector<std::string>{"max", "1..max"}));
@@ -237,7 +236,8 @@ SceneReference read_scene(const TableReader& sweep, const toml::node& node, cons
   return scene;
 }
 
-Sweep read_sweep(const toml::table& table, const std::string& file, const std::filesystem::path& folder) {
+Sweep read_sweep(const toml::table& table, const std::string& file, const std::filesystem::path& folder,
+                 const PlanTarget& target) {
   Sweep sweep;
   TableReader reader(table, file);
   reader.each("scene", [&](const toml::node& node) {
@@ -277,8 +277,8 @@ Sweep read_sweep(const toml::table& table, const std::string& file, const std::f
       return sweep.threads.push_back(static_cast<int>(*value));
     if (!node.is_string())
       reader.fail(node, "threads", "must be whole numbers from 1, \"max\" or \"1..max\"");
-    const auto counts =
-        reader.located(node, "threads", [&] { return parse_threads(*node.value<std::string>()); });
+    const auto counts = reader.located(
+        node, "threads", [&] { return parse_threads(*node.value<std::string>(), target.cpus); });
     sweep.threads.insert(sweep.threads.end(), counts.begin(), counts.end());
   });
   std::vector<std::string> bindings, waits, runtimes;
@@ -297,7 +297,8 @@ Sweep read_sweep(const toml::table& table, const std::string& file, const std::f
   reader.words("cache", kCaches, "warm", sweep.caches);
   reader.strings("generality", sweep.generalities,
                  [](const std::string& s) { return parse_generality(s, "generality"); });
-  reader.strings("isa", sweep.isas, [](const std::string& s) { return parse_isa(s, "isa"); });
+  reader.strings("isa", sweep.isas,
+                 [&](const std::string& s) { return s == "best" ? target.best : parse_isa(s, "isa"); });
   reader.strings("techniques", sweep.techniques,
                  [](const std::string& s) { return parse_techniques(s, "techniques"); });
   reader.reject_unknown_keys("[[sweep]]");
@@ -313,10 +314,10 @@ Sweep read_sweep(const toml::table& table, const std::string& file, const std::f
     reader.fail(table, "execution", "is missing from this [[sweep]]");
   if (sweep.fills.empty()) sweep.fills.push_back(FillRule::kClosed);
   if (sweep.nears.empty()) sweep.nears.push_back(NearRule::kClip);
-  if (sweep.threads.empty()) sweep.threads = {available_cpus()};
+  if (sweep.threads.empty()) sweep.threads = {target.cpus};
   if (sweep.tiles.empty()) sweep.tiles.push_back(64);
   if (sweep.generalities.empty()) sweep.generalities.push_back(Generality::kMinimal);
-  if (sweep.isas.empty()) sweep.isas.push_back(best_isa());
+  if (sweep.isas.empty()) sweep.isas.push_back(target.best);
   if (sweep.techniques.empty()) sweep.techniques.push_back({});
   return sweep;
 }
@@ -352,7 +353,7 @@ Study read_study_file(const std::filesystem::path& path) {
 }
 
 std::vector<Sweep> read_sweeps(const std::filesystem::path& path, const std::string& text,
-                               const std::vector<std::string>& scenes,
+                               const PlanTarget& target, const std::vector<std::string>& scenes,
                                const std::vector<std::string>& sizes) {
   const std::string file = path.string();
   const toml::table table = parse_toml(text, file);
@@ -366,7 +367,7 @@ std::vector<Sweep> read_sweeps(const std::filesystem::path& path, const std::str
   std::vector<Sweep> all;
   for (const toml::node& node : *sweeps) {
     if (!node.is_table()) throw InputError({.file = file, .field = "sweep"}, "must be [[sweep]] tables");
-    Sweep sweep = read_sweep(*node.as_table(), file, path.parent_path());
+    Sweep sweep = read_sweep(*node.as_table(), file, path.parent_path(), target);
     if (!scenes.empty()) {
       sweep.scenes.clear();
       for (const std::string& scene : scenes) sweep.scenes.push_back(parse_scene_reference(scene));

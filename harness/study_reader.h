@@ -10,6 +10,12 @@
 
 namespace rasterbench {
 
+/// The machine that a study is planned for.
+struct PlanTarget {
+  int cpus = 1;               ///< what "max" means
+  Isa best = Isa::kBaseline;  ///< what "best" means
+};
+
 /// One [[sweep]]: the values of each axis.
 struct Sweep {
   std::vector<SceneReference> scenes;
@@ -34,7 +40,8 @@ Study read_study_file(const std::filesystem::path& file);
 
 /// The [[sweep]] tables of `text`. Scenes and sizes, if not empty, replace those of every sweep.
 std::vector<Sweep> read_sweeps(const std::filesystem::path& file, const std::string& text,
-                               const std::vector<std::string>& scenes, const std::vector<std::string>& sizes);
+                               const PlanTarget& target, const std::vector<std::string>& scenes,
+                               const std::vector<std::string>& sizes);
 
 /// Calls `visit` for every combination of a sweep. An axis that does not apply to a point is not multiplied:
 /// serial has one thread, kernels without tiles one tile size, and modes without screen triangles no geometry

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <map>
 
 #include "base/error.h"
 
@@ -185,6 +186,48 @@ threads = [1, 2]
   StudyOptions too_many;
   too_many.shards = 3;
   EXPECT_THROW(read(two, too_many), InputError);
+}
+
+TEST_F(StudyTest, AFamilyHasAllInstructionSetsOfAPicture) {
+  const std::string text = R"(
+[[sweep]]
+scene = "teapot:triangles=100"
+size = ["64x48", "32x24"]
+kernel = ["tile_parallel"]
+numeric = ["f32", "fixed_8"]
+execution = ["serial", "openmp:static"]
+threads = [1, 2]
+isa = ["baseline", "avx2"]
+)";
+  const Study study = read(text);
+  EXPECT_EQ(study.families, 4u);
+  std::map<std::string, std::size_t> family_of_picture;
+  for (const PlannedPoint& planned : study.points) {
+    const Point& point = planned.point;
+    const auto [known, is_new] =
+        family_of_picture.emplace(std::to_string(point.width) + point.numeric, planned.family);
+    EXPECT_EQ(known->second, planned.family) << planned.name;
+  }
+  EXPECT_EQ(family_of_picture.size(), 4u);
+}
+
+TEST_F(StudyTest, APlanForAnotherMachineHasItsThreadsAndInstructionSet) {
+  StudyOptions options;
+  options.cpus = 12;
+  options.isa = Isa::kSse4;
+  const Study study = read(R"(
+[[sweep]]
+scene = "teapot:triangles=100"
+kernel = ["tile_parallel"]
+execution = ["openmp:static"]
+threads = ["max", 13]
+)",
+                           options);
+  ASSERT_EQ(study.points.size(), 2u);
+  EXPECT_EQ(study.points[0].point.execution.threads, 12);
+  EXPECT_EQ(study.points[0].skip, "");
+  EXPECT_EQ(study.points[0].point.isa, Isa::kSse4);
+  EXPECT_NE(study.points[1].skip.find("13 threads on 12 CPUs"), std::string::npos) << study.points[1].skip;
 }
 
 }  // namespace

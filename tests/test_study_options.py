@@ -7,6 +7,7 @@ import io
 import json
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -102,6 +103,47 @@ def test_a_shard_is_recorded(folder: Path) -> None:
     study(folder, *FOUR, "--out", "out", "--shard", "2/3").ok()
     assert json.loads((folder / "out/context.json").read_text())["study"]["shard"] == "2/3"
     assert [r["name"] for r in records(folder / "out")] == listed(folder, *FOUR, "--shard", "2/3")
+
+
+# Families, for job arrays.
+
+def plan(folder: Path, *options: object) -> dict[str, Any]:
+    return json.loads(study(folder, "--list", "--json", *options).ok().stdout)
+
+
+def test_families_are_the_whole_study_with_the_ids_of_its_records(folder: Path) -> None:
+    planned = plan(folder, *FOUR)
+    assert [f["shard"] for f in planned["families"]] == ["1/4", "2/4", "3/4", "4/4"]
+    assert len({f["id"] for f in planned["families"]}) == 4
+    assert sorted(p["name"] for f in planned["families"] for p in f["points"]) == sorted(listed(folder, *FOUR))
+    second = planned["families"][1]
+    study(folder, *FOUR, "--shard", "2/4", "--family", second["id"], "--out", "out").ok()
+    assert [r["id"] for r in records(folder / "out")] == [p["id"] for p in second["points"]]
+    assert second["threads"] == max(p["threads"] for p in second["points"])
+
+
+def test_a_family_is_the_same_for_any_shard_and_another_for_other_sampling(folder: Path) -> None:
+    planned = plan(folder, *FOUR)["families"]
+    assert plan(folder, *FOUR, "--shard", "3/4")["families"] == [planned[2]]
+    text = (folder / "tiny.toml").read_text()
+    (folder / "tiny.toml").write_text(text.replace("max_samples = 6", "max_samples = 7"))
+    others = plan(folder, *FOUR)["families"]
+    assert [p["id"] for p in others[2]["points"]] == [p["id"] for p in planned[2]["points"]] and others[2]["id"] != planned[2]["id"]
+
+
+def test_another_family_than_the_planned_one_is_refused(folder: Path) -> None:
+    first, second = plan(folder, *FOUR)["families"][:2]
+    refused(study(folder, *FOUR, "--shard", "2/4", "--family", first["id"], "--out", "out"), "--family", first["id"], second["id"])
+    refused(study(folder, *FOUR, "--shard", "1/2", "--family", first["id"], "--out", "out"), "--family", "--shard I/4")
+    assert not (folder / "out").exists()
+
+
+def test_a_plan_for_more_cpus_is_refused_where_they_are_not(folder: Path) -> None:
+    (folder / "tiny.toml").write_text(sampling() + sweep(execution="openmp:static", threads=["max"]))
+    assert plan(folder, "--cpus", 300)["families"][0]["threads"] == 300
+    refused(study(folder, "--cpus", 300, "--out", "out"), "--cpus", "300 threads", "--oversubscribe")
+    refused(study(folder, "--isa", "mmx"), "--isa", "mmx", "avx2")
+    assert not (folder / "out").exists()
 
 
 # The folder.
