@@ -1,0 +1,146 @@
+"""What SLURM says: its limits, its queue, and how a job that left the queue ended."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+from dataclasses import dataclass
+from typing import Sequence
+
+from .folder import Element, Failure
+
+TIMEOUT_S = 60  # of one question; a busy controller may take its time
+MAX_ARRAY_SIZE = 1001  # SLURM's default: indices are below it
+
+# Of the submitter's SLURM_ variables only these are for the commands; the others are of a job that submit runs in, and
+# sbatch would take the memory or CPUs of that job for those of the new one.
+_KEPT = ("SLURM_CONF", "SLURM_CONF_SERVER", "SLURM_CLUSTERS", "SLURM_TIME_FORMAT")
+
+
+@dataclass(frozen=True)
+class Active:
+    """An element in the queue."""
+
+    state: str  # SLURM's: PENDING, RUNNING, COMPLETING, ...
+    node: str
+    reason: str
+
+    @property
+    def is_pending(self) -> bool:
+        return self.state in ("PENDING", "REQUEUED", "REQUEUE_HOLD", "REQUEUE_FED", "SPECIAL_EXIT", "RESV_DEL_HOLD")
+
+
+def environment() -> dict[str, str]:
+    """For sbatch: without options that nobody sees on the command line."""
+    return {name: value for name, value in os.environ.items()
+            if not name.startswith(("SBATCH_", "SRUN_", "SLURM_", "SLURMD_")) or name in _KEPT}
+
+
+def ignored_variables() -> list[str]:
+    return sorted(name for name in os.environ if name.startswith("SBATCH_"))
+
+
+def is_installed() -> bool:
+    return shutil.which("sbatch") is not None and shutil.which("squeue") is not None
+
+
+def answers() -> bool:
+    """Whether there is a cluster to ask."""
+    try:
+        return is_installed() and bool(ask(["sinfo", "-h"]))
+    except Failure:
+        return False
+
+
+def ask(command: Sequence[str]) -> str:
+    """The output of a SLURM command. Throws Failure with its last line on stderr."""
+    try:
+        done = subprocess.run(command, env=environment(), capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
+    except FileNotFoundError:
+        raise Failure(f"{command[0]}: not found: is SLURM installed, and its commands on the PATH?") from None
+    except subprocess.TimeoutExpired:
+        raise Failure(f"{command[0]}: no answer for {TIMEOUT_S} s") from None
+    if done.returncode != 0:
+        lines = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
+        raise Failure(f"{command[0]}: {lines[-1].removeprefix(command[0] + ': ')}")
+    return done.stdout
+
+
+def sbatch(command: Sequence[str]) -> int:
+    """Submits and gives the job's id. In a session of its own, so that Ctrl-C cannot come between job and id."""
+    if command[0] != "sbatch" or "--parsable" not in command:
+        raise ValueError("not a command of submit")
+    previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        output = ask(command)
+    finally:
+        signal.signal(signal.SIGINT, previous)
+    match = re.match(r"(\d+)(;|$)", output.strip())
+    if not match:
+        raise Failure(f"sbatch: said {output.strip()!r} where a job id was expected")
+    return int(match[1])
+
+
+def max_array_size() -> int:
+    match = re.search(r"^MaxArraySize\s*=\s*(\d+)", ask(["scontrol", "show", "config"]), re.MULTILINE)
+    return int(match[1]) if match else MAX_ARRAY_SIZE
+
+
+def cores_of_nodes() -> int:
+    """Cores of the largest node."""
+    found = [int(sockets) * int(cores) for sockets, cores in (line.split() for line in ask(["sinfo", "-h", "-o", "%X %Y"]).splitlines()
+                                                              ) if sockets.isdigit() and cores.isdigit()]
+    if not found:
+        raise Failure("sinfo: knows no node")
+    return max(found)
+
+
+def active(elements: Sequence[Element]) -> dict[Element, Active]:
+    """Those of `elements` that are in the queue."""
+    if not elements:
+        return {}
+    by_name = {str(element): element for element in elements}
+    found: dict[Element, Active] = {}
+    for line in ask(["squeue", "-h", "-r", "-u", str(os.getuid()), "-o", "%F_%K|%T|%N|%r"]).splitlines():
+        name, state, node, reason = line.split("|", 3)
+        if name in by_name:
+            found[by_name[name]] = Active(state, node, reason)
+    return found
+
+
+def ended(elements: Sequence[Element]) -> dict[Element, str]:
+    """How elements that left the queue ended, as SLURM's state: of the accounting where there is one, else of what the
+    controller still remembers. Those that nobody knows of are not in the answer."""
+    jobs = sorted({element.job for element in elements})
+    if not jobs:
+        return {}
+    states: dict[str, str] = {}
+    try:
+        output = ask(["sacct", "-n", "-X", "-P", "-j", ",".join(map(str, jobs)), "-o", "JobID,State"])
+        states = dict(line.split("|", 1) for line in output.splitlines() if "|" in line)
+    except Failure:  # no accounting: many small clusters have none
+        pass
+    if not states:
+        for job in jobs:
+            try:
+                output = ask(["scontrol", "show", "job", "-o", str(job)])
+            except Failure:  # forgotten after MinJobAge
+                continue
+            for line in output.splitlines():
+                fields = dict(word.split("=", 1) for word in line.split() if "=" in word)
+                for index in _indices(fields.get("ArrayTaskId", "")):
+                    states[f"{fields.get('ArrayJobId')}_{index}"] = fields.get("JobState", "")
+    return {element: states[str(element)].split()[0] for element in elements if states.get(str(element))}
+
+
+def _indices(text: str) -> list[int]:
+    """Of '3' or '0-2,5%4'."""
+    found: list[int] = []
+    for part in text.partition("%")[0].split(","):
+        low, _, high = part.partition("-")
+        if low.isdigit() and (not high or high.isdigit()):
+            found += range(int(low), int(high or low) + 1)
+    return found
