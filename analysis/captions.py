@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from . import text
+from . import nodes, text
 from .comparison import Analysis
 from .load import Record
 
@@ -53,8 +53,8 @@ def build(analysis: Analysis, title: str, reading: str, shown: list[Record], *, 
     counts = [samples.n for samples in timed]
     facts = Facts(estimates if shown else None, kind or None if estimates and shown else None, base or None,
                   (min(counts), max(counts)) if counts else None, (min(launches), max(launches)) if launches else None,
-                  analysis.machine)
+                  nodes.machine(shown) or analysis.machine)
     if launches:
         sentences.append(f"{text.count(max(launches), 'launch', 'launches')}.")
-    sentences.append(f"Machine: {analysis.machine}.")
+    sentences.append(f"Machine: {facts.machine}.")
     return Caption(title, " ".join(sentences), reading, facts)

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, Iterator
 
-from . import statistics, text
+from . import nodes, statistics, text
 from .comparison import Analysis
 from .figures.balance import busy
 from .load import Record
@@ -25,7 +25,7 @@ class Warn:
 
 def check(analysis: Analysis) -> list[Warn]:
     """The grave ones first."""
-    found = [warn for rule in (_launches, _samples, _stops, _provenance, _load, _bases, _pinning, _threads, _floors,
+    found = [warn for rule in (_launches, _samples, _stops, _provenance, _nodes, _load, _bases, _pinning, _threads, _floors,
                                _families, _agreement, _images) for warn in rule(analysis)]
     return sorted(found, key=lambda warn: warn.severity != NOT_PUBLISHABLE)
 
@@ -76,6 +76,20 @@ def _provenance(analysis: Analysis) -> Iterator[Warn]:
                if isinstance(value, str) and value.startswith("unavailable")]
     if missing:
         yield Warn(NOTE, f"not available on this machine: {text.listing(missing, 6)}.")
+
+
+def _nodes(analysis: Analysis) -> Iterator[Warn]:
+    """What was measured on several nodes compares machines."""
+    types = nodes.node_types(analysis.study.every_record)
+    names = nodes.nodes(analysis.study.every_record)
+    if mixed := nodes.mixed_groups(analysis):
+        yield Warn(NOT_PUBLISHABLE, f"points that are compared were measured on different nodes: {text.listing(mixed, 4)}.")
+    if len(types) > 1:
+        yield Warn(NOT_PUBLISHABLE, f"{len(types)} types of nodes: {text.listing(types, 4)}. What goes over several pictures (time against"
+                   " work, where each strategy wins, speed against accuracy, sums over scenes) compares machines, too.")
+    elif len(names) > 1:
+        yield Warn(NOTE, f"measured on {len(names)} nodes of one type ({types[0]}): each picture and numeric mode on one of them, so"
+                   " curves over several of these hold the differences between nodes.")
 
 
 def _leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:

@@ -6,7 +6,7 @@ import hashlib
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from . import statistics, text
+from . import nodes, statistics, text
 from .load import Config, Record, Study
 from .statistics import Comparison, Estimate
 
@@ -137,7 +137,7 @@ class Analysis:
     @cached_property
     def machine(self) -> str:
         """'AMD EPYC 7763, 8 CPUs' for captions."""
-        return text.machine(self.study.context["machine"])
+        return nodes.machine(self.study.every_record) or text.machine(self.study.context["machine"])
 
     # groups and bases
 

@@ -8,10 +8,10 @@ A difference is claimed only if the rank test (Holm-corrected within its family)
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Callable, Iterator
 
-from . import statistics, text, trade_text
+from . import nodes, statistics, text, trade_text
 from .comparison import Analysis, Group, Panel
 from .figures.balance import imbalance
 from .figures.scaling import curves
@@ -322,5 +322,5 @@ def top(analysis: Analysis, count: int = COUNT) -> list[Finding]:
     chosen: list[Finding] = []
     for finding in ranked:
         if len(chosen) < count and all(finding.kind != other.kind for other in chosen):
-            chosen.append(finding)
+            chosen.append(replace(finding, text=finding.text + nodes.remark(analysis.study)))
     return chosen

@@ -81,6 +81,7 @@ class Record:
     context: str | None
     raw: dict[str, Any] = field(repr=False, default_factory=dict)
     floor_ms: float | None = None  # absent in older records
+    origin: dict[str, Any] | None = None  # of merged studies: the node, its type, the job
 
     @property
     def ok(self) -> bool:
@@ -269,7 +270,13 @@ class _Reader:
         return Record(self.line, identity, name, config, status, reason, samples, stages, value.get("stop"), verify,
                       self.mapping("work"), observed if is_number(observed) else None, tuple(per_thread),
                       float(median) if is_number(median) else None, tuple(recorded) if recorded else None,
-                      value.get("context"), value, self.floor())
+                      value.get("context"), value, self.floor(), self.origin())
+
+    def origin(self) -> dict[str, Any] | None:
+        origin = self.mapping("origin")
+        for key in ("node", "node_type") if origin else ():
+            self.text(origin, key, "origin.")
+        return origin or None
 
     def floor(self) -> float | None:
         floor = self.value.get("floor_ms")

@@ -12,7 +12,7 @@ import jinja2
 import matplotlib
 from markupsafe import Markup
 
-from . import (__version__, checks, figures, findings, ladder, lint, sidecars, stage_efficiency, statistics, strategy_map, style, tables, text,
+from . import (__version__, checks, figures, findings, ladder, lint, nodes, sidecars, stage_efficiency, statistics, strategy_map, style, tables, text,
                trade, trade_tables, trade_text, work, writing)
 from .captions import Caption
 from .comparison import Analysis
@@ -49,7 +49,7 @@ def write(analysis: Analysis, out: Path | None = None) -> Written:
             kind, suffix = ("image/png", "png") if drawing.raster else ("image/svg+xml", "svg")
             uri = data_uri(kind, made[f"{drawing.name}.{suffix}"])
             sections.setdefault(drawing.section, []).append(Embedded(drawing.name, number, uri, drawing.caption))
-    found = [t for module in (tables, trade_tables, ladder, strategy_map, work, stage_efficiency) for t in module.tables(analysis)]
+    found = [t for module in (nodes, tables, trade_tables, ladder, strategy_map, work, stage_efficiency) for t in module.tables(analysis)]
     for table in found:
         if table.section:
             sections.setdefault(table.section, [])  # a section may have tables and no figure
@@ -97,7 +97,7 @@ def placed(found: list[Table], hidden: set[str]) -> dict[str, list[Table]]:
     for table in found:
         if table.section or table.name in hidden:
             continue
-        kind = ("run" if table.name == "not_timed" else "verification" if table.name == "verification" else
+        kind = ("run" if table.name in ("not_timed", "nodes") else "verification" if table.name == "verification" else
                 "long" if table.name in ("stages", "over_scenes") and len(table.words) > 12 else "results")
         places[kind].append(table)
     # The overview comes before the table that has everything.
