@@ -59,6 +59,7 @@ def parser() -> Parser:
     main.add_argument("--cpus", metavar="N", type=whole, help="CPUs of a node: what `max` means (default: cores of the cluster's largest"
                       " node; without SLURM, those of this process)")
     main.add_argument("--isa", help="instruction set of the nodes: what `best` means (default: this CPU's)")
+    main.add_argument("--no-report", action="store_true", help="let the merge job merge only; the report needs matplotlib on the node")
     main.add_argument("--shared", action="store_true", help="do not ask for whole nodes (recorded; other jobs disturb times)")
     main.add_argument("--oversubscribe", action="store_true", help="allow more threads than CPUs")
     main.add_argument("--filter", metavar="REGEX", help="only points whose name this matches, as of `rasterbench study`")
@@ -178,11 +179,12 @@ def array_command(array: Array, folder: Folder, submission: Path, options: argpa
             f"--output={folder.slurm}/logs/%A_%a.out", *extra, str(submission / "task"), str(submission), array.tasks]
 
 
-def merge_command(jobs: Sequence[object], folder: Folder, submission: Path, name: str, extra: Sequence[str]) -> list[str]:
+def merge_command(jobs: Sequence[object], folder: Folder, submission: Path, options: argparse.Namespace, name: str,
+                  extra: Sequence[str]) -> list[str]:
     # afterany: afterok would wait for ever after one failure, and it is the merge that says what is missing.
     return ["sbatch", "--parsable", f"--job-name={name}-merge", f"--dependency=afterany:{':'.join(map(str, jobs))}", "--nodes=1",
             "--ntasks=1", "--cpus-per-task=1", f"--chdir={Path.cwd()}", f"--output={folder.slurm}/logs/merge-%j.out", *extra,
-            str(submission / "merge-task"), str(submission), str(ROOT), str(folder.root)]
+            str(submission / "merge-task"), str(submission), str(ROOT), str(folder.root), *(["--no-report"] if options.no_report else [])]
 
 
 def plan_script(folder: Folder, manifest: Manifest, program: Path) -> str:
@@ -296,7 +298,7 @@ def show(folder: Folder, manifest: Manifest, options: argparse.Namespace, extra:
     for array, command in zip(arrays, commands):
         print(shlex.join(command))
     if arrays:
-        print(shlex.join(merge_command([f"JOB_{array.name}" for array in arrays], folder, submission, name, extra)))
+        print(shlex.join(merge_command([f"JOB_{array.name}" for array in arrays], folder, submission, options, name, extra)))
         print(f"\n# plan: {folder.manifest_path}")
         for array in arrays:
             print(f"# {submission / array.tasks}\n{array.lines()}", end="")
@@ -351,7 +353,7 @@ def submit_arrays(folder: Folder, submission: Path, arrays: Sequence[Array], opt
         print(f"submitted {array.name} as job {job}")
     jobs = [entry["job"] for entry in record["arrays"]]
     if jobs:
-        record["merge"] = cluster.sbatch(merge_command(jobs, folder, submission, name, extra))
+        record["merge"] = cluster.sbatch(merge_command(jobs, folder, submission, options, name, extra))
         write_whole(submission / "submission.json", dump(record))
         print(f"submitted merge as job {record['merge']}; slurm/status {shlex.quote(str(folder.root))} says how far it is")
     if problem:
