@@ -25,7 +25,7 @@ class Warn:
 
 def check(analysis: Analysis) -> list[Warn]:
     """The grave ones first."""
-    found = [warn for rule in (_launches, _samples, _stops, _provenance, _nodes, _load, _bases, _pinning, _threads, _floors,
+    found = [warn for rule in (_launches, _samples, _stops, _provenance, _nodes, _jobs, _load, _bases, _pinning, _threads, _floors,
                                _families, _agreement, _images) for warn in rule(analysis)]
     return sorted(found, key=lambda warn: warn.severity != NOT_PUBLISHABLE)
 
@@ -90,6 +90,26 @@ def _nodes(analysis: Analysis) -> Iterator[Warn]:
     elif len(names) > 1:
         yield Warn(NOTE, f"measured on {len(names)} nodes of one type ({types[0]}): each picture and numeric mode on one of them, so"
                    " curves over several of these hold the differences between nodes.")
+
+
+def _jobs(analysis: Analysis) -> Iterator[Warn]:
+    """What the jobs of a merged study were given, against what they asked for."""
+    found = analysis.study.context.get("parts")
+    jobs = [part["provenance"] for part in found if isinstance(part, dict) and isinstance(part.get("provenance"), dict)] \
+        if isinstance(found, list) else []
+    narrow = [job for job in jobs if _is_count(job.get("mask_cpus")) and _is_count(job.get("cpus_per_task"))
+              and job["mask_cpus"] < job["cpus_per_task"]]
+    if narrow:
+        yield Warn(NOT_PUBLISHABLE, f"{len(narrow)} of {text.count(len(jobs), 'job')} might use fewer CPUs than they reserved (first:"
+                   f" {narrow[0]['mask_cpus']} of {narrow[0]['cpus_per_task']} on {narrow[0].get('node')}): threads shared a core.")
+    shared = [job for job in jobs if job.get("exclusive") is not True]
+    if shared:
+        yield Warn(NOTE, f"{len(shared)} of {text.count(len(jobs), 'job')} did not have their node to themselves, or do not say so: other"
+                   " jobs may have disturbed them.")
+
+
+def _is_count(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)
 
 
 def _leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:

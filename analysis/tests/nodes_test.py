@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any, Callable
 
@@ -73,3 +74,17 @@ def test_a_wrong_origin_is_refused(origin: object, study: Callable[..., Path], c
     directory = study(edit=lambda records: records[0].update(origin=origin))
     assert program.main(["report", str(directory)]) == 2
     assert "records.jsonl:1: origin" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("job, warned", [
+    ({"mask_cpus": 4, "cpus_per_task": 4, "exclusive": True}, []),
+    ({"mask_cpus": 8, "cpus_per_task": 4, "exclusive": True}, []),  # hardware threads
+    ({"mask_cpus": 1, "cpus_per_task": 4, "exclusive": True}, ["fewer CPUs than they reserved (first: 1 of 4 on n1)"]),
+    ({"mask_cpus": 4, "cpus_per_task": 4, "exclusive": False}, ["did not have their node to themselves"])])
+def test_jobs_that_were_given_less_are_called_so(job: dict[str, Any], warned: list[str], study: Callable[..., Path]) -> None:
+    directory = study()
+    context = json.loads((directory / "context.json").read_text())
+    context["parts"] = [{"family": "f", "provenance": job | {"node": "n1"}}]
+    (directory / "context.json").write_text(json.dumps(context))
+    said = [w.text for w in checks.check(analyse(directory)) if "of 1 job" in w.text]
+    assert len(said) == len(warned) and all(words in text for words, text in zip(warned, said))
