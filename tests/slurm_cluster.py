@@ -67,8 +67,8 @@ class Cluster:
             shutil.rmtree(parent)
 
     def environment(self, **changes: str) -> dict[str, str]:
-        # Without a cluster even an installed sbatch answers nothing: its configuration is an empty file's.
-        return without_slurm(SLURM_CONF=self.conf or "/nonexistent/slurm.conf", **changes)
+        # An installed sbatch without a cluster has an empty configuration; one that is not there would be waited for.
+        return without_slurm(SLURM_CONF=self.conf or "/dev/null", **changes)
 
     def command(self, *words: object, cwd: Path | None = None, **variables: str) -> Outcome:
         done = subprocess.run(list(map(str, words)), cwd=cwd, env=self.environment(**variables), capture_output=True, text=True,
