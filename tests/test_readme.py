@@ -96,6 +96,20 @@ def lint_of_a_small_study(words: list[str]) -> list[list[str]]:
     return [["bash", "-c", f"{shlex.join(words)}; test $? -eq 1"]]
 
 
+def submitted_dry(words: list[str]) -> list[list[str]]:
+    """The plan only, with the program that is built; test_slurm_runs.py submits to a cluster."""
+    own = words[:words.index("--")] if "--" in words else words
+    dry = [] if "--dry-run" in words else ["--dry-run"]
+    return [[*own, *dry, "--program", "build/release/bin/rasterbench", *words[len(own):]]]
+
+
+def states_of_a_planned_study(words: list[str]) -> list[list[str]]:
+    """Of a study of which nothing is done: exit code 3, and what is missing."""
+    folder = words[1]
+    plan = f"build/release/bin/rasterbench study small.toml --list --json > {folder}/slurm/manifest.json"
+    return [["mkdir", "-p", f"{folder}/slurm"], ["bash", "-c", plan], ["bash", "-c", f"{shlex.join(words)} || [ $? = 3 ]"]]
+
+
 def presets_that_there_are(words: list[str]) -> list[list[str]]:
     """Configuring and building again is the tests' own prerequisite."""
     kind = "build" if "--build" in words else "configure"
@@ -121,6 +135,8 @@ TABLE: list[tuple[str, Shorten]] = [
     (r"scripts/python -m analysis compare .*", comparison_of_small_studies),
     (r"scripts/python -m analysis selftest .*", as_it_stands),
     (r"scripts/python -m analysis lint .*", lint_of_a_small_study),
+    (r"slurm/submit .*", submitted_dry),
+    (r"slurm/(status|merge) \S+", states_of_a_planned_study),
     (r"cmake --preset \S+|cmake --build --preset \S+", presets_that_there_are),
 ]
 

@@ -151,7 +151,11 @@ def run(directory: Path, report: bool) -> int:
 
 
 def draw(directory: Path) -> None:
-    """The report of what there is. Throws Failure."""
+    """The report of what there is, unless it is drawn already. Throws Failure."""
+    report = directory / "report.html"
+    if report.is_file() and all(report.stat().st_mtime_ns > (directory / name).stat().st_mtime_ns for name in ("records.jsonl", "context.json")):
+        print(f"report: {report} (of these records already)")
+        return
     done = subprocess.run([ROOT / "scripts/python", "-m", "analysis", "report", directory], stderr=subprocess.PIPE, text=True, check=False)
     if done.returncode != 0:
         last = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
