@@ -7,7 +7,6 @@ import json
 import os
 import shutil
 import subprocess
-import sys
 import tempfile
 import time
 from dataclasses import dataclass
@@ -17,8 +16,6 @@ from typing import Any, Callable, Iterator, Sequence
 import pytest
 
 from .program import ROOT, TIMEOUT, Outcome, environment, program
-
-sys.path.insert(0, str(ROOT / "slurm"))
 
 DAEMONS = ("slurmctld", "slurmd", "munged", "sbatch")
 

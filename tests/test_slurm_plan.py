@@ -247,6 +247,43 @@ def test_ctrl_c_is_one_line(study: Path, tmp_path: Path) -> None:
     assert process.returncode == 130 and errors.startswith("slurm/submit: interrupted") and "Traceback" not in errors
 
 
+# Parts.
+
+@pytest.fixture
+def jobs(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """The package of slurm/, for what no throw-away cluster shows."""
+    monkeypatch.syspath_prepend(str(ROOT / "slurm"))
+    import jobs.cluster
+    import jobs.folder
+    import jobs.merge
+    return jobs
+
+
+@pytest.mark.parametrize("text, indices", [("3", [3]), ("0-2,5%4", [0, 1, 2, 5]), ("7,9", [7, 9]), ("", []), ("N/A", [])])
+def test_indices_of_an_array(text: str, indices: list[int], jobs: Any) -> None:
+    assert jobs.cluster._indices(text) == indices
+
+
+def test_where_there_is_accounting_it_says_how_jobs_ended(jobs: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The tests' clusters have no slurmdbd: this sacct prints what one prints."""
+    (tmp_path / "sacct").write_text("#!/bin/sh\necho '7_0|TIMEOUT'\necho '7_1|CANCELLED by 1000'\necho '7_2|NODE_FAIL'\n")
+    (tmp_path / "sacct").chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    elements = [jobs.folder.Element(1, 7, index) for index in range(4)]
+    assert {str(e): state for e, state in jobs.cluster.ended(elements).items()} == {
+        "7_0": "TIMEOUT", "7_1": "CANCELLED", "7_2": "NODE_FAIL"}
+
+
+def test_types_of_nodes(jobs: Any) -> None:
+    machine = {"cpu": "A", "cores": 8, "packages": 1, "cpus_online": 8, "numa_nodes": 1, "smt": False, "caches": [], "memory_bytes": 64 * 2**30}
+    almost, other, more = machine | {"memory_bytes": 64 * 2**30 - 2**20}, machine | {"cpu": "B"}, machine | {"memory_bytes": 128 * 2**30}
+    names = jobs.merge.type_names([machine, almost, other, more])
+    assert sorted(names.values()) == ["A, 8 cores in 1 packages", "A, 8 cores in 1 packages (type 2)", "B, 8 cores in 1 packages"]
+    assert jobs.merge.type_key(machine) == jobs.merge.type_key(almost) != jobs.merge.type_key(more)
+    assert jobs.merge.joined([1, 1]) == 1 and jobs.merge.joined(["a", "b", "a"]) == "differs between nodes: a; b"
+    assert jobs.merge.highest_load(["0.5 1 1", "3.25 1 1", "unavailable"]) == "3.25 1 1"
+
+
 # Scripts.
 
 @pytest.mark.parametrize("script", SCRIPTS)
