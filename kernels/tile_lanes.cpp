@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <limits>
 
 #include "base/isa_dispatch.h"
 #include "kernels/tile_pixels.h"

@@ -58,8 +58,9 @@ struct TileScratch {
   Buffer<std::int32_t> ranks;  ///< kNoRank: nothing there yet
   TileTriangles triangles;
   Isa isa = Isa::kBaseline;
-  alignas(64) float farthest[64 + 16];         ///< of each block: at least the depths of its pixels
-  std::int64_t hidden_entries = 0;             ///< triangles left out because all of the tile is nearer
+  /// Of each block: at least the depths of its pixels. Room for a vector behind.
+  alignas(64) float farthest[kMostBlocks + TriangleStreams::kOverhang];
+  std::int64_t hidden_entries = 0;             ///< as in WorkCounters
   std::vector<std::uint32_t> order, unsorted;  ///< of the large triangles: their indices
   Buffer<std::uint32_t> heads, ids, colours;   ///< of the runs of pixels that show one triangle
 };

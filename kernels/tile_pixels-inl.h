@@ -53,9 +53,11 @@ HWY_INLINE void start_tile(TilePixels& tile, int rows_in_memory) {
   clear(tile, {0, tile.side, columns, rows_in_memory});
   const std::int32_t blocks = tile.blocks();
   tile.untouched = ~std::uint64_t{0} >> (64 - blocks);
-  std::fill_n(tile.farthest, blocks, kClearDepth);
-  // Vectors look at what is behind, too.
-  std::fill_n(tile.farthest + blocks, kLanes, -std::numeric_limits<float>::infinity());
+  // Nothing is drawn into blocks beyond the image; vectors look at what is behind the last one, too.
+  std::fill_n(tile.farthest, static_cast<std::size_t>(blocks) + kLanes,
+              -std::numeric_limits<float>::infinity());
+  for (std::int32_t block = 0; block < blocks; ++block)
+    if (!tile.block_in_image(block).empty()) tile.farthest[block] = kClearDepth;
 }
 
 /// Stores the lanes of `mask`; the others hold `old`, which is what is there.

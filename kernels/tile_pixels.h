@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <bit>
 #include <cstdint>
-#include <limits>
 
 #include "kernels/fragments.h"
 #include "kernels/tile_lanes.h"
@@ -41,9 +40,6 @@ struct TilePixels {
   /// Those of the image.
   PixelBox block_in_image(std::int32_t number) const {
     return intersect(block(number), {0, 0, width(), height()});
-  }
-  float& farthest_at(std::int32_t x, std::int32_t y) const {
-    return farthest[(y >> kBlockShift << block_shift()) + (x >> kBlockShift)];
   }
 
   /// Keeps a fragment if its key is smaller.

@@ -227,8 +227,8 @@ HWY_INLINE float largest(const float* values, std::int32_t n) {
   return hn::GetLane(hn::MaxOfLanes(kFloats, most));
 }
 
-/// The triangles that are set up, in the order in which a tile draws them: the large ones from front to back,
-/// by blocks, then the others.
+/// The triangles that are set up, in the order in which a tile draws them: the large ones first, with the
+/// techniques from front to back and by blocks.
 template <class Arithmetic>
 class TriangleDrawing {
  public:
@@ -246,7 +246,7 @@ class TriangleDrawing {
       if (is_large(i)) order.push_back(static_cast<std::uint32_t>(i));
     if (rejects_) sort_roughly(triangles_.nearest, order, scratch_.unsorted);
     if (!settings_.techniques.blocks) clear_untouched(tile_);
-    float farthest = largest(tile_.farthest, tile_.blocks());
+    float farthest = rejects_ ? largest(tile_.farthest, tile_.blocks()) : 0;
     for (const std::uint32_t i : order) {
       if (rejects_ && triangles_.nearest[i] > farthest) {
         ++scratch_.hidden_entries;
@@ -256,7 +256,7 @@ class TriangleDrawing {
         scratch_.hidden_entries += !draw_in_blocks<Arithmetic>(triangles_, i, settings_, tile_);
       else
         draw_whole(i);
-      farthest = largest(tile_.farthest, tile_.blocks());
+      if (rejects_) farthest = largest(tile_.farthest, tile_.blocks());
     }
   }
 
@@ -278,16 +278,13 @@ class TriangleDrawing {
   /// Triangles of few pixels hide nothing and cost less than to be ordered and taken apart.
   bool is_large(std::size_t i) const { return area_of_box(i) >= kBlockSide * kBlockSide; }
 
-  /// Of a triangle in at most 2 x 2 blocks; of others nobody asks.
+  /// Whether what is shown in every block that the triangle's box touches is nearer.
   bool is_hidden(std::size_t i) const {
-    const std::int32_t x0 = triangles_.x0[i], x1 = triangles_.x1[i] - 1;
-    const std::int32_t y0 = triangles_.y0[i], y1 = triangles_.y1[i] - 1;
-    const auto far = [](std::int32_t from, std::int32_t to) {
-      return (to >> kBlockShift) - (from >> kBlockShift) > 1;
-    };
-    if (far(x0, x1) || far(y0, y1)) return false;
-    return triangles_.nearest[i] > std::max({tile_.farthest_at(x0, y0), tile_.farthest_at(x1, y0),
-                                             tile_.farthest_at(x0, y1), tile_.farthest_at(x1, y1)});
+    const std::int32_t x1 = (triangles_.x1[i] - 1) >> kBlockShift, y1 = (triangles_.y1[i] - 1) >> kBlockShift;
+    for (std::int32_t y = triangles_.y0[i] >> kBlockShift; y <= y1; ++y)
+      for (std::int32_t x = triangles_.x0[i] >> kBlockShift; x <= x1; ++x)
+        if (!(triangles_.nearest[i] > tile_.farthest[(y << tile_.block_shift()) + x])) return false;
+    return true;
   }
 
   void draw_whole(std::size_t i) {

@@ -55,7 +55,7 @@ struct WorkCounters {
   /// Fragments that were binned in place of their triangles.
   std::optional<std::int64_t> binned_fragments;
   std::optional<std::int64_t> bin_entries;  ///< pairs of a triangle and a cell that its box touches
-  /// Of these, entries whose triangle lies wholly behind what the tile shows, so that they were left out.
+  /// Of these, entries left out because what the tile shows is nearer wherever their triangles reach.
   std::optional<std::int64_t> hidden_entries;
   std::optional<std::int64_t> merges;  ///< keys of private buffers that were compared with the frame's
   std::optional<StageBytes> clear_bytes, geometry_bytes, raster_bytes, resolve_bytes;
