@@ -28,7 +28,7 @@ def share(words: str) -> float:
 def parser() -> Parser:
     main = Parser(prog="python3 -m analysis", description="Turns the records of a study into figures, tables and a report.",
                   epilog="Exit codes: 0 done, 1 compare found a slower point, lint a broken rule or selftest too many differences,"
-                         " 2 bad input or usage (one line on stderr), 3 compare found a point that only A has, or that failed in B.")
+                         " 2 bad input or usage (one line on stderr), 3 compare found a point that only A has, or that failed in B, 4 compare could not tell most points.")
     main.add_argument("--version", action="version", version=f"rasterbench analysis {__version__}")
     commands = main.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=Parser)
     report = commands.add_parser("report", help="write report.html, figures/ and tables/ and print three findings",
@@ -52,7 +52,8 @@ def parser() -> Parser:
                                   description="Says of each point whether B is FASTER or SLOWER than A, the SAME within the margin, or"
                                               " AMBIGUOUS, with the ratio of their times and its 95 %% interval. Exit codes: 0 nothing"
                                               " is slower, 1 a point is slower, 2 bad input, or the recorded contexts differ (one line"
-                                              " a difference), 3 a point was lost.")
+                                              " a difference), 3 a point was lost, 4 undecided: no point, or fewer than half of the"
+                                              " points, could be called FASTER, SLOWER or SAME.")
     for name, what in (("a", "the run that is compared with"), ("b", "the run that is judged")):
         compare.add_argument(name, metavar=f"DIR_{name.upper()}", type=Path,
                              help=f"{what}: folder of a study, or a file of Google Benchmark's JSON")
@@ -61,8 +62,12 @@ def parser() -> Parser:
                               " (program, machine.kernel, ...); points: points that B has not; may be given several times")
     compare.add_argument("--margin", metavar="SHARE", type=share,
                          help="differences within it are SAME (default: the studies' target, else 0.02)")
-    compare.add_argument("--one-launch", action="store_true",
-                         help="judge runs of one launch, too, whose differences may be those of two launches (default: AMBIGUOUS)")
+    compare.add_argument("--few-launches", action="store_true",
+                         help="judge points with fewer than five launches on a side, too, whose differences may be those of other"
+                              " processes (default: AMBIGUOUS)")
+    compare.add_argument("--repeat", metavar="DIR_A2", type=Path, action="append", default=[],
+                         help="another run of A: what differs by no more than A from itself is AMBIGUOUS; may be given several times, and"
+                              " two repeats tell much more than one")
     compare.add_argument("--json", action="store_true", help="print JSON instead of text")
     compare.add_argument("-o", "--out", metavar="FOLDER", type=Path, help="also write comparison.csv, .tex, .json and its figure")
     stability = commands.add_parser("stability", help="draw the stability envelopes of numeric modes and list their breaking points",
@@ -102,7 +107,7 @@ def main(arguments: list[str] | None = None) -> int:
             from . import compare
 
             outcome = compare.compare(compare.read(options.a), compare.read(options.b), options.ignore, options.margin,
-                                      options.one_launch)
+                                      options.few_launches, [compare.read(path) for path in options.repeat])
             from . import comparison_output
 
             written = comparison_output.write(outcome, options.out) if options.out else []

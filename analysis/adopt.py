@@ -183,8 +183,8 @@ def write(directory: Path) -> str:
         for drawn in drawing.draw(adoption):
             figures |= {f"{drawn.name}.{kind}": content for kind, content in style.outputs(drawn.figure).items()}
             figures[f"{drawn.name}.txt"] = f"{drawn.caption.plain}\n{drawn.caption.reading}\n"
-    writing.write_folder(directory / "figures", figures)
-    writing.write_folder(directory / "tables", {"adopt.csv": made.csv(), "adopt.tex": made.tex()})
+    writing.write_folder(directory / "figures", figures, "adopt")
+    writing.write_folder(directory / "tables", {"adopt.csv": made.csv(), "adopt.tex": made.tex()}, "adopt")
     noise = f"\n{adoption.noise}" if adoption.noise else ""
     return f"{plain(made.words)}{noise}\nwritten: {directory / 'figures'}: {', '.join(figures)}; {directory / 'tables'}: adopt.csv, adopt.tex"
 

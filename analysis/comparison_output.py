@@ -14,16 +14,18 @@ import numpy as np
 import pandas as pd
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from scipy import stats
 
 from . import contexts, sidecars, statistics, style, text, writing
 from .captions import Caption, Facts
-from .compare import AMBIGUOUS, FASTER, LOST, SAME, SLOWER, VERDICTS, Outcome, Row, Run, common_shift
+from .compare import AMBIGUOUS, CHOSEN, FASTER, LOST, SAME, SLOWER, DECIDED_SHARE, VERDICTS, Outcome, Row, Run, common_shift
 from .figures import common
 from .tables import Table
 
 # Colour, marker and filling, so that a verdict can be read in grey, too.
 LOOKS = {FASTER: (style.COLOURS[0], "<", True), SLOWER: (style.COLOURS[1], ">", True), SAME: (style.COLOURS[6], "o", True),
          AMBIGUOUS: (style.COLOURS[7], "D", False)}
+OUT_OF_REACH = 12.0  # standard errors that launches have to be apart: from there on the reader is told
 MEANING = {FASTER: "B is faster", SLOWER: "B is slower", SAME: "the same within the margin", AMBIGUOUS: "ambiguous"}
 
 
@@ -48,6 +50,8 @@ def remarks(outcome: Outcome) -> list[str]:
              " of the ratio of medians. P(B>A): chance that a sample of B takes longer than one of A."]
     whys = Counter(row.why for row in outcome.rows if row.verdict == AMBIGUOUS)
     lines += [f"Ambiguous: {text.count(many, 'point')}, {why}." for why, many in whys.most_common()]
+    lines += _power(outcome)
+    lines.append(_yardstick(outcome))
     shift = common_shift(outcome)
     if shift is not None:
         lines.append(f"Nearly every point moved to the same side, by {text.percent(abs(shift - 1))} in the median: a machine that"
@@ -56,10 +60,54 @@ def remarks(outcome: Outcome) -> list[str]:
         lines.append(f"Only in B: {text.listing(outcome.only_b, 1000)}.")
     if outcome.only_a:
         lines.append(f"Only in A, as allowed by --ignore: {text.listing(outcome.only_a, 1000)}.")
-    lines += [f"Differs, as allowed by --ignore: {d.key}: {d.words}." for d in outcome.ignored]
+    for name, run in (("A", outcome.a), ("B", outcome.b)):
+        unsaid = [f"{point} ({why})" for point, why in run.untimed.items() if name == "A" or point not in outcome.a.samples]
+        if unsaid:
+            lines.append(f"Without times in {name}: {text.listing(unsaid, 1000)}.")
+    lines += [f"Differs, {'as the program chose it from the time of a frame' if d.key == CHOSEN else 'as allowed by --ignore'}: {d.key}: {d.words}."
+              for d in outcome.ignored]
     if not (outcome.a.complete and outcome.b.complete):
-        lines.append("Google Benchmark's JSON records little of the set-up: only host and CPUs were compared.")
+        lines.append("Google Benchmark's JSON records little of the set-up: " + (
+            "only host and CPUs were compared." if outcome.a.complete or outcome.b.complete else "its own context was compared, and no more."))
+    if outcome.status == 4:
+        lines.append(f"UNDECIDED: less than {text.percent(DECIDED_SHARE)} of the points could be told; this is not \"nothing is slower\".")
     return lines
+
+
+def _power(outcome: Outcome) -> list[str]:
+    """What the counts allow to be found at all."""
+    judged = outcome.judged
+    if not judged:
+        return ["No point has the samples and launches for a test: whatever the times, none could be called FASTER or SLOWER."]
+    lines = []
+    assumed = sum(row.test == statistics.WELCH for row in judged)
+    if assumed:
+        lines.append(f"Too few samples for a rank test to survive Holm over {text.count(len(judged), 'point')}: {assumed} of them use Welch's"
+                     " t on logarithms, which assumes a distribution.")
+    few = [row for row in judged if min(row.a.launch_count, row.b.launch_count) < statistics.MIN_LAUNCHES]
+    if few:
+        lines.append(f"{text.count(len(few), 'point')} judged with fewer than {statistics.MIN_LAUNCHES} launches on a side: such a verdict is one on"
+                     " those processes, and others may differ by as much.")
+    level = (1 - statistics.CONFIDENCE) / len(judged)
+    launches = [min(row.a.launch_count, row.b.launch_count) for row in judged if min(row.a.launch_count, row.b.launch_count) > 1]
+    if launches:
+        least = min(launches)
+        needed = float(stats.t.isf(level / 2, 2 * least - 2))
+        if needed > OUT_OF_REACH:
+            lines.append(f"Holm over {text.count(len(judged), 'point')} asks for p below {level:.1g}: with {least} launches a side only a shift of"
+                         f" {needed:.0f} standard errors of the launches has it. Take more launches, or compare fewer points.")
+    return lines
+
+
+def _yardstick(outcome: Outcome) -> str:
+    """What the reader has to know of the machine between the runs."""
+    words = "A and B were not interleaved: what the machine did between them counts as a difference"
+    if not outcome.repeats:
+        return f"{words}. Repeats of A (--repeat) would say how much that is."
+    distances = [np.expm1(row.distance) for row in outcome.rows if row.ratio is not None]
+    return (f"{words} unless A moves as far by itself: {text.count(len(outcome.repeats), 'repeat')} of A"
+            f" ({', '.join(str(run.path) for run in outcome.repeats)}) widened the intervals by {text.percent(min(distances))} to"
+            f" {text.percent(max(distances))}.")
 
 
 def _median(samples: statistics.Samples) -> float:
@@ -74,7 +122,8 @@ def table(outcome: Outcome) -> Table:
         numbers.append({"verdict": row.verdict, "point": row.name, "a_ms": a, "b_ms": b, "b_over_a": ratio.value if ratio else None,
                         "low": ratio.low if ratio else None, "high": ratio.high if ratio else None,
                         "p_holm": row.p if ratio else None, "superiority": row.superiority if ratio else None,
-                        "n_a": row.a.n, "n_b": row.b.n if row.b is not None else 0, "why": row.why})
+                        "n_a": row.a.n, "n_b": row.b.n if row.b is not None else 0, "why": row.why, "test": row.test,
+                        "moved_by_repeats": float(np.expm1(row.distance))})
         words.append({"point": row.name, "A (ms)": text.number(a), "B (ms)": text.number(b),
                       "time B / A": text.estimate(ratio.value, ratio.low, ratio.high) if ratio else text.MISSING,
                       "verdict": row.verdict})
@@ -90,7 +139,7 @@ def as_json(outcome: Outcome) -> str:
 
     points = [{key: None if isinstance(value, float) and np.isnan(value) else value for key, value in entry.items()}
               for entry in table(outcome).numbers.astype(object).to_dict("records")]
-    return json.dumps({"a": run(outcome.a), "b": run(outcome.b), "margin": outcome.margin, "status": outcome.status,
+    return json.dumps({"a": run(outcome.a), "b": run(outcome.b), "margin": outcome.margin, "status": outcome.status, "repeats": [run(r) for r in outcome.repeats],
                        "points": points, "only_a": outcome.only_a, "only_b": outcome.only_b,
                        "ignored": [difference(d) for d in outcome.ignored], "remarks": remarks(outcome)}, indent=1)
 
@@ -125,10 +174,7 @@ def _figure(outcome: Outcome, rows: list[Row], limits: tuple[float, float], suff
                              limits=limits, log=log, keys=keys)
     for patch in list(frame.axes.patches):
         patch.remove()  # the band of a kernel's rows: there is one block, and the margin is the band here
-    if log:
-        frame.axes.set_xlim(limits)
-    else:
-        frame.axes.set_xlim(*limits)
+    frame.axes.set_xlim(limits)
     frame.axes.axvspan(1 / (1 + outcome.margin), 1 + outcome.margin, fc=style.BAND, ec="#BBBBBB", lw=0.5, zorder=0)
     frame.axes.axvline(1, color="black", lw=0.8, ls=(0, (4, 2)), zorder=1)
     for (y, _), row in zip(frame.rows, rows):
@@ -168,6 +214,10 @@ def _caption(outcome: Outcome, rows: list[Row], suffix: str) -> Caption:
                                      (launches[0], launches[-1]), str(name)))
 
 
+def _paths(outcome: Outcome) -> list[Path]:
+    return [run.path for run in (outcome.a, outcome.b, *outcome.repeats)]
+
+
 def write(outcome: Outcome, folder: Path) -> list[Path]:
     """comparison.{csv,tex,json} and ratios.{svg,pdf,png,json}."""
     made = table(outcome)
@@ -175,5 +225,6 @@ def write(outcome: Outcome, folder: Path) -> list[Path]:
     with matplotlib.rc_context(style.RC):
         for drawing in drawings(outcome):
             files |= sidecars.files(drawing)
-    writing.write_folder(folder, files)
+    read = [path / name for path in _paths(outcome) for name in ("records.jsonl", "context.json")] + _paths(outcome)
+    writing.write_folder(folder, files, "compare", read)
     return [folder / name for name in files]

@@ -28,7 +28,7 @@ class Difference:
 def differences(a: dict[str, Any], b: dict[str, Any], shared_only: bool = False) -> list[Difference]:
     """Every recorded condition that is not equal, in the order of the keys; with shared_only those that both runs record (a
     file of Google Benchmark says less than a context, which is no difference of the runs)."""
-    left, right = dict(_leaves(a)), dict(_leaves(b))
+    left, right = dict(leaves(a)), dict(leaves(b))
     keys = sorted(left.keys() & right.keys() if shared_only else left.keys() | right.keys())
     found = (Difference(key, left.get(key, ABSENT), right.get(key, ABSENT)) for key in keys if not under(key, MEASURED))
     return [difference for difference in found if difference.a != difference.b]
@@ -39,10 +39,11 @@ def under(key: str, names: Sequence[str]) -> bool:
     return any(key == name or key.startswith(f"{name}.") for name in names)
 
 
-def _leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+def leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted keys and values of what lies in nested objects."""
     if isinstance(value, dict):
         for key, item in value.items():
-            yield from _leaves(item, f"{path}.{key}" if path else str(key))
+            yield from leaves(item, f"{path}.{key}" if path else str(key))
     else:
         yield path, value
 

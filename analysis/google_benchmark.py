@@ -12,12 +12,16 @@ import numpy as np
 from .load import InputError, parse, read_text
 from .statistics import Samples, is_number
 
+# Of a run, not of its conditions; the executable is a path.
+MEASURED = ("date", "executable", "load_avg")
+SHARED = {"host_name": "hostname", "num_cpus": "cpus_online"}  # keys that a study's context has under `machine`, too
 MILLISECONDS = {"s": 1e3, "ms": 1.0, "us": 1e-3, "ns": 1e-6}
 
 
 @dataclass(frozen=True)
 class Runs:
-    """name -> times in milliseconds, or None with the error under `errors`; context in the keys of context.json."""
+    """samples: name -> times in milliseconds; errors: name -> why it has none, each name in one of them. context: host and CPUs
+    under the keys of context.json, the rest under google_benchmark."""
 
     context: dict[str, Any]
     samples: dict[str, Samples]
@@ -25,7 +29,7 @@ class Runs:
 
 
 def read(path: Path) -> Runs:
-    value = parse(read_text(path, "no such file"), path, None)
+    value = parse(read_text(path, "no such file"), path, None, nan=True)  # what it cannot compute is NaN there
     runs, about = value.get("benchmarks"), value.get("context")
     if not isinstance(runs, list) or not isinstance(about, dict):
         raise InputError(path, "expected the JSON of Google Benchmark: an object with context and benchmarks")
@@ -41,21 +45,24 @@ def read(path: Path) -> Runs:
         name = run.get("run_name", run.get("name"))
         if not isinstance(name, str) or not name:
             raise InputError(path, f"expected text, found {name!r}", None, f"{place}.name")
-        if run.get("error_occurred"):
-            errors[name] = str(run.get("error_message") or "no reason given")
+        if run.get("error_occurred") or run.get("skipped"):
+            errors.setdefault(name, str(run.get("error_message") or run.get("skip_message") or "no reason given"))
             continue
-        if run.get("time_unit") not in MILLISECONDS:
-            raise InputError(path, f"is {run.get('time_unit')!r}, expected one of {', '.join(MILLISECONDS)}", None,
+        unit = run.get("time_unit")
+        if not isinstance(unit, str) or unit not in MILLISECONDS:
+            raise InputError(path, f"is {unit!r}, expected one of {', '.join(MILLISECONDS)}", None,
                              f"{place}.time_unit")
         time = run.get("real_time")
         if not is_number(time) or time <= 0:
             raise InputError(path, f"expected a number above 0, found {time!r}", None, f"{place}.real_time")
-        times.setdefault(name, []).append(time * MILLISECONDS[run["time_unit"]])
+        times.setdefault(name, []).append(time * MILLISECONDS[unit])
     if not times and not errors:
         raise InputError(path, "holds no runs, only aggregates or nothing: run it without --benchmark_report_aggregates_only",
                          None, "benchmarks")
-    machine = {"hostname": about.get("host_name"), "cpus_online": about.get("num_cpus")}
-    context = {"machine": {key: item for key, item in machine.items() if item is not None}}
+    for name in errors.keys() & times.keys():  # half of a benchmark selects: those that failed might have been the slow ones
+        errors[name] += f" (its {len(times.pop(name))} other repetitions are not used)"
+    context = {"machine": {ours: about[key] for key, ours in SHARED.items() if about.get(key) is not None},
+               "google_benchmark": {key: item for key, item in about.items() if key not in (*SHARED, *MEASURED)}}
     return Runs(context, {name: one_launch(values) for name, values in times.items()}, errors)
 
 

@@ -97,6 +97,7 @@ class Study:
     records: list[Record]
     peers: list[Record] = field(default_factory=list)
     records_hash: str = ""  # of the bytes of records.jsonl
+    raw_context: dict[str, Any] = field(default_factory=dict)  # as context.json has it, without the defaults of _context
 
     @property
     def every_record(self) -> list[Record]:
@@ -151,10 +152,10 @@ def load(directory: Path) -> Study:
     directory = Path(directory)
     if not directory.is_dir():
         raise InputError(directory, "no such folder (expected the folder that a study wrote)")
-    context = _context(directory / "context.json")
+    context, raw = _context(directory / "context.json")
     records = _records(directory / "records.jsonl")
     digest = hashlib.sha256((directory / "records.jsonl").read_bytes()).hexdigest()[:32]
-    return Study(directory, context, [r for r in records if not r.config.is_peer], [r for r in records if r.config.is_peer], digest)
+    return Study(directory, context, [r for r in records if not r.config.is_peer], [r for r in records if r.config.is_peer], digest, raw)
 
 
 def read_text(path: Path, missing: str = "no such file (was the study interrupted? run it again with --resume)") -> str:
@@ -166,12 +167,13 @@ def read_text(path: Path, missing: str = "no such file (was the study interrupte
         raise InputError(path, f"cannot be read: {error}") from None
 
 
-def parse(text: str, path: Path, line: int | None) -> dict[str, Any]:
+def parse(text: str, path: Path, line: int | None, nan: bool = False) -> dict[str, Any]:
+    """An object. nan: NaN and infinities are let through, for who checks the numbers that are used."""
     def refuse(name: str) -> float:
         raise ValueError(f"{name} is not a JSON number")
 
     try:
-        value = json.loads(text, parse_constant=refuse)
+        value = json.loads(text, parse_constant=None if nan else refuse)
     except json.JSONDecodeError as error:
         raise InputError(path, f"not JSON: {error.msg} at column {error.colno}", line or error.lineno) from None
     except (ValueError, RecursionError) as error:
@@ -188,8 +190,10 @@ def check_schema(value: dict[str, Any], path: Path, line: int | None) -> None:
         raise InputError(path, f"is {value['schema']!r}, this program reads {SCHEMA}", line, "schema")
 
 
-def _context(path: Path) -> dict[str, Any]:
+def _context(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """With its defaults, and as it was written."""
     context = parse(read_text(path), path, None)
+    raw = dict(context)
     check_schema(context, path, None)
     for key in ("program", "machine", "study"):
         if key not in context:
@@ -201,7 +205,7 @@ def _context(path: Path) -> dict[str, Any]:
             context[key] = {}
         elif not isinstance(context[key], dict):
             raise InputError(path, "expected an object", None, key)
-    return context
+    return context, raw
 
 
 def _records(path: Path) -> list[Record]:

@@ -57,8 +57,9 @@ def write(analysis: Analysis, out: Path | None = None) -> Written:
     html = render(analysis, sections, found, top, lint.lint(analysis, files))
     path = out if out is not None else directory / "report.html"
     captions = "".join(f"Figure {e.number} ({e.name}): {e.caption.plain}\n\n" for es in sections.values() for e in es)
-    writing.write_folder(directory / "figures", files | ({"captions.txt": captions.encode()} if captions else {}))
-    writing.write_folder(directory / "tables", {f"{t.name}.csv": t.csv() for t in found} | {f"{t.name}.tex": t.tex() for t in found})
+    writing.refuse_inputs([path], [directory / name for name in ("records.jsonl", "context.json", "journal.jsonl")])
+    writing.write_folder(directory / "figures", files | ({"captions.txt": captions.encode()} if captions else {}), "report")
+    writing.write_folder(directory / "tables", {f"{t.name}.csv": t.csv() for t in found} | {f"{t.name}.tex": t.tex() for t in found}, "report")
     writing.write(path, html)
     return Written(path, top)
 

@@ -184,6 +184,7 @@ def write(path: Path, folder: Path) -> list[Path]:
     made = table(found)
     files |= {f"{made.name}.csv": made.csv(), f"{made.name}.tex": made.tex(),
               f"{made.name}.txt": f"{drawn.caption.plain}\n{drawn.caption.reading}\n"}
+    writing.refuse_inputs((folder / name for name in files), [path])
     for name, content in files.items():
         writing.write(folder / name, content)
     return [folder / name for name in files]

@@ -20,7 +20,7 @@ RESAMPLES = 2000
 SEED = 20240229  # fixed, so that the same records always give the same report
 MIN_SAMPLES = 6  # below it, [min, max] covers the median with less than 95 %
 MIN_LAUNCHES = 5
-ONE_LAUNCH = "one launch"
+EXACT_PAIRS = 625  # pairs of samples up to which Mann-Whitney is exact: 25 against 25
 SIGNED_RANK, RANK_SUM, WELCH = "Wilcoxon signed-rank", "Mann-Whitney", "Welch t on logarithms"
 
 
@@ -253,7 +253,6 @@ def rank_test(slower: Samples, faster: Samples, family: float) -> tuple[float, s
     groups = paired(slower, faster)
     pairs = np.concatenate(groups) if groups else np.array([])
     a, b = slower.values, faster.values
-    together = np.concatenate([a, b])
     if len(pairs) >= MIN_SAMPLES and 2.0 ** (1 - len(pairs)) * family < level:
         differences = np.log(pairs)
         if not np.any(differences):
@@ -263,17 +262,44 @@ def rank_test(slower: Samples, faster: Samples, family: float) -> tuple[float, s
             return float(stats.wilcoxon(differences).pvalue), SIGNED_RANK
     if min(len(a), len(b)) < MIN_SAMPLES:
         return 1.0, "none"
-    rank_sum = 2 / math.comb(len(together), len(a)) * family < level
-    if np.ptp(together) == 0:
+    return unpaired_test(a, b, family)
+
+
+def unpaired_test(a: np.ndarray, b: np.ndarray, family: float) -> tuple[float, str]:
+    """Two-sided p and the name of the test of samples that share no blocks: Mann-Whitney where its least p survives the
+    correction in a family of this size, else Welch's t on logarithms. The choice depends on the counts only."""
+    rank_sum = least_rank_sum_p(len(a), len(b)) * family < 1 - CONFIDENCE
+    if np.ptp(np.concatenate([a, b])) == 0:
         return 1.0, RANK_SUM if rank_sum else WELCH
     if rank_sum:
-        tied = len(np.unique(together)) < len(together)
-        method = "exact" if not tied and len(a) * len(b) <= 625 else "asymptotic"
-        return float(stats.mannwhitneyu(a, b, alternative="two-sided", method=method).pvalue), RANK_SUM
+        return rank_sum_p(a, b), RANK_SUM
     with warnings.catch_warnings():  # equal samples have no variance; then p is nan or 0
         warnings.simplefilter("ignore")
         p = float(stats.ttest_ind(np.log(a), np.log(b), equal_var=False).pvalue)
     return (p if math.isfinite(p) else 1.0), WELCH
+
+
+def least_rank_sum_p(n: int, m: int) -> float:
+    """The least p that rank_sum_p gives n and m samples without ties: that of two runs without overlap."""
+    if n * m <= EXACT_PAIRS:
+        return 2 / math.comb(n + m, n)
+    return float(2 * stats.norm.sf((n * m / 2 - 0.5) / math.sqrt(n * m * (n + m + 1) / 12)))
+
+
+def rank_sum_p(a: np.ndarray, b: np.ndarray) -> float:
+    """Two-sided p of Mann-Whitney: exact, over all ways to deal the (mid)ranks, up to EXACT_PAIRS pairs; normal beyond.
+    Ties are dealt as they are (Streitberg and Roehmel, Exact distributions for permutation and rank tests, 1986), so that a
+    clock of few digits does not cost the exact test."""
+    if len(a) * len(b) > EXACT_PAIRS:
+        return float(stats.mannwhitneyu(a, b, alternative="two-sided", method="asymptotic").pvalue)
+    ranks = np.rint(2 * stats.rankdata(np.concatenate([a, b]))).astype(int)  # midranks are halves
+    ways = np.zeros((len(a) + 1, int(ranks.sum()) + 1))  # [how many were taken][their sum]; exact in double up to 2^53
+    ways[0, 0] = 1
+    for rank in ranks:
+        ways[1:, rank:] += ways[:-1, :-rank].copy()
+    off = np.abs(np.arange(ways.shape[1]) * len(ranks) - len(a) * int(ranks.sum()))  # from the mean, in whole numbers
+    observed = off[int(ranks[: len(a)].sum())]
+    return float(min(1.0, ways[-1][off >= observed].sum() / ways[-1].sum()))
 
 
 def launch_test(slower: Samples, faster: Samples) -> float:
@@ -296,36 +322,68 @@ def launch_medians(samples: Samples) -> np.ndarray:
     return np.log([np.median(group) for group in samples.by_launch()])
 
 
-def between_runs(samples: Samples, base: Samples) -> tuple[Estimate, float]:
-    """Ratio of the medians of two runs, samples / base, and the two-sided p of no difference.
+def between_runs(samples: Samples, base: Samples, family: float = 1) -> tuple[Estimate, float, str]:
+    """Ratio of the medians of two runs, samples / base, the two-sided p of no difference, and the test of the samples.
 
-    Runs share no blocks and no drift, so nothing is paired. The samples must differ by the rank test, and the launches,
-    which are what repeats, by Welch's t on the logarithms of their medians: p is the larger one. The interval is the wider
-    of that t's and of the bootstrap over launches, then blocks, which alone is too narrow for few launches. With one
-    launch on either side the samples would have to stand for launches, which they cannot (another launch has another
-    memory layout): p is the rank test's and the note says so.
+    Runs share no blocks and no drift, so nothing is paired. The samples must differ by unpaired_test in a family of this many
+    comparisons, and the launches, which are what repeats, by Welch's t on the logarithms of their medians: p is the larger
+    one. The interval is the wider of that t's and of the bootstrap over launches, then blocks, which alone is too narrow for
+    few launches. With one launch on either side the samples have to stand for launches, which they cannot (another launch has
+    another memory layout): p is that of the samples.
     """
     value = float(np.median(samples.values) / np.median(base.values))
     n = min(samples.n, base.n)
     if n < MIN_SAMPLES:
-        return Estimate(value, None, None, n, "none", f"fewer than {MIN_SAMPLES} samples"), 1.0
+        return Estimate(value, None, None, n, "none", f"fewer than {MIN_SAMPLES} samples"), 1.0, "none"
     above, below = _resampled_medians(samples.by_launch()), _resampled_medians(base.by_launch(), SEED + 1)
     low, high = _quantiles(above / below)
-    p = float(stats.mannwhitneyu(samples.values, base.values, alternative="two-sided").pvalue)
+    p, test = unpaired_test(samples.values, base.values, family)
     if min(samples.launch_count, base.launch_count) < 2:
-        return Estimate(value, low, high, n, "bootstrap over blocks", ONE_LAUNCH), p
+        return Estimate(value, low, high, n, "bootstrap over blocks"), p, test
     a, b = launch_medians(samples), launch_medians(base)
     # Welch (1947): the degrees of freedom of Satterthwaite.
     variances = a.var(ddof=1) / len(a), b.var(ddof=1) / len(b)
     error = math.sqrt(sum(variances))
     shift = float(a.mean() - b.mean())
     if error == 0:
-        return Estimate(value, low, high, n, "bootstrap over launches, then blocks"), p if shift else 1.0
+        return Estimate(value, low, high, n, "bootstrap over launches, then blocks"), p if shift else 1.0, test
     freedom = error**4 / (variances[0] ** 2 / (len(a) - 1) + variances[1] ** 2 / (len(b) - 1))
     half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, freedom)) * error
     p = max(p, float(2 * stats.t.sf(abs(shift) / error, freedom)))
     return Estimate(value, min(low, math.exp(shift - half)), max(high, math.exp(shift + half)), n,
-                    "Welch t over launches, or bootstrap where wider"), p
+                    "Welch t over launches, or bootstrap where wider"), p, test
+
+
+def yardstick(logs: np.ndarray) -> np.ndarray:
+    """How far a point may move between two runs of one program, as a distance of logarithms; one a point.
+
+    logs[point, run]: log medians of two or more runs of the same program; nan where a run lacks a point. What a run adds to
+    all points (the median over them) and what it adds to one have standard deviations c, from as many values as there are
+    runs, and s, pooled over the points. The difference of two runs has sqrt(2) times that, so the distance is the root of the
+    sum of the squares of t * sqrt(2) c, with runs - 1 degrees of freedom, and t * sqrt(2) s, with t at 0.05 / points
+    (Bonferroni: what is common to all is wrong once, what is a point's own in each); and at least what the point did move.
+    With one repeat t is 12.7 for the common part: one repeat says little, two or three say much more.
+    """
+    moved = logs - logs[:, :1]
+    known = moved[np.all(np.isfinite(moved), axis=1)]
+    points, runs = known.shape
+    common = np.median(known, axis=0)
+    tail = (1 - CONFIDENCE) / 2
+    whole = stats.t.ppf(1 - tail, runs - 1) * math.sqrt(2) * float(np.std(common, ddof=1))
+    own = 0.0
+    if points > 1:
+        pooled = math.sqrt(float(np.mean(np.var(known - common, axis=1, ddof=1))) * points / (points - 1))
+        own = stats.t.ppf(1 - tail / len(logs), (runs - 1) * (points - 1)) * math.sqrt(2) * pooled
+    return np.maximum(math.hypot(whole, own), np.nanmax(np.abs(moved), axis=1))
+
+
+def widened_by(estimate: Estimate, distance: float) -> Estimate:
+    """The interval of a ratio with another error of `distance` (95 %, on the log scale), which is independent of its own."""
+    if not estimate.has_interval:
+        return estimate
+    low = estimate.value * math.exp(-math.hypot(math.log(estimate.value / min(estimate.low, estimate.value)), distance))
+    high = estimate.value * math.exp(math.hypot(math.log(max(estimate.high, estimate.value) / estimate.value), distance))
+    return replace(estimate, low=low, high=high, kind=f"{estimate.kind}, widened by the repeats of A")
 
 
 def superiority(slower: Samples, faster: Samples) -> float:
@@ -392,5 +450,15 @@ def _quantiles(draws: np.ndarray) -> tuple[float, float]:
     return float(low), float(high)
 
 
+def is_close(a: float, b: float) -> bool:
+    """Whether a stored number is the computed one: six digits are written."""
+    return math.isclose(a, b, rel_tol=1e-4, abs_tol=1e-6)
+
+
 def is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    if not isinstance(value, (int, float)) or isinstance(value, bool):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # JSON has integers of any length
+        return False

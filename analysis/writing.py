@@ -6,6 +6,9 @@ import json
 import os
 import tempfile
 from pathlib import Path
+from typing import Iterable
+
+from .load import InputError
 
 MANIFEST = ".written.json"
 
@@ -30,17 +33,36 @@ def write(path: Path, content: str | bytes) -> None:
         raise
 
 
-def write_folder(folder: Path, files: dict[str, str | bytes]) -> None:
-    """Writes the files, then removes those that an earlier run wrote and this one did not. Others' files stay."""
+def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
+    """Raises InputError where a file that is about to be written is one that was read, under whatever name or link."""
+    read = [path for path in inputs if path.exists()]
+    for output in outputs:
+        if output.exists() and any(output.samefile(path) for path in read):
+            raise InputError(output, "is read, and would be written over: write into another folder (--out)")
+
+
+def write_folder(folder: Path, files: dict[str, str | bytes], writer: str, inputs: Iterable[Path] = ()) -> None:
+    """Writes the files, then removes those that an earlier run of this writer wrote and this one did not. Others' files stay.
+    The manifest is {writer: [file]}; one without writers, as older versions left it, says whose nothing is. inputs: files that
+    must not be written over."""
+    inputs = list(inputs)
+    refuse_inputs((folder / name for name in files), inputs)
     manifest = folder / MANIFEST
     try:
-        earlier = json.loads(manifest.read_text(encoding="utf-8"))
+        found = json.loads(manifest.read_text(encoding="utf-8"))
     except (OSError, ValueError):
-        earlier = []
+        found = {}
+    known = {key: {name for name in names if isinstance(name, str)} for key, names in found.items() if isinstance(names, list)} \
+        if isinstance(found, dict) else {}
+    stale = {name for name in known.pop(writer, set()) - files.keys() if Path(name).name == name}
+    # A file that two wrote is the later one's.
+    known = {key: names - files.keys() for key, names in known.items()}
+    stale -= set().union(*known.values())
+    refuse_inputs((folder / name for name in stale), inputs)
     for name, content in files.items():
         write(folder / name, content)
-    for name in earlier if isinstance(earlier, list) else []:
-        if isinstance(name, str) and name not in files and Path(name).name == name:
-            (folder / name).unlink(missing_ok=True)
+    for name in stale:
+        (folder / name).unlink(missing_ok=True)
     if files or manifest.exists():
-        write(manifest, json.dumps(sorted(files)) + "\n")
+        known[writer] = set(files)
+        write(manifest, json.dumps({key: sorted(names) for key, names in sorted(known.items()) if names}) + "\n")

@@ -44,9 +44,10 @@ def slowed(studies: Path, target: Path, factor: float) -> Path:
 def test_two_runs_can_be_compared(studies: Path, tmp_path: Path) -> None:
     """The contexts of two runs of one program on one machine do not differ, whatever the times do."""
     done = analysis("compare", studies / "a", studies / "b", "--json", "-o", tmp_path / "out")
-    assert done.code in (0, 1), done.stderr
+    assert done.code in (0, 1, 4), done.stderr  # busy machines leave points undecided
     value = json.loads(done.stdout)
-    assert len(value["points"]) == POINTS and not value["ignored"]
+    assert len(value["points"]) == POINTS
+    assert {difference["key"] for difference in value["ignored"]} <= {"frames_per_sample"}  # chosen from times
     assert (tmp_path / "out/ratios.png").stat().st_size > 1000
     assert analysis("compare", studies / "a", studies / "a", "--margin", "0.9").code == 0
 
@@ -67,11 +68,11 @@ def test_another_context(studies: Path, tmp_path: Path) -> None:
     assert done.code == 2 and not done.stdout and any("study.sampling.launches" in line for line in done.errors)
     done = analysis("compare", studies / "a", tmp_path / "c", "--ignore", "study")
     assert done.code == 3 and "LOST" in done.stdout  # two points are not in c
-    assert analysis("compare", studies / "a", tmp_path / "c", "--ignore", "study", "--ignore", "points").code == 0
+    assert analysis("compare", studies / "a", tmp_path / "c", "--ignore", "study", "--ignore", "points").code == 4  # c has one launch
 
 
 def test_google_benchmark_of_the_same_run(studies: Path) -> None:
-    done = analysis("compare", studies / "a", studies / "a.json", "--one-launch", "--json")
+    done = analysis("compare", studies / "a", studies / "a.json", "--few-launches", "--margin", "0.9", "--json")
     assert done.code == 0, done.stderr
     points = json.loads(done.stdout)["points"]
     assert len(points) == POINTS and all(point["b_over_a"] == pytest.approx(1, abs=1e-6) for point in points)

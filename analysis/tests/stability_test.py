@@ -46,6 +46,15 @@ def test_breaking_points(tmp_path, counts, held, breaks):
     assert (envelope.held[0].parameter, envelope.held[-1].parameter) == held if held else envelope.held == []
 
 
+def test_the_input_is_not_written_over(tmp_path, capsys):
+    path = write(tmp_path, [line()]).rename(tmp_path / "stability.json")
+    before = path.read_bytes()
+    assert program.main(["stability", str(path)]) == 2
+    assert "stability.json: is read" in capsys.readouterr().err and path.read_bytes() == before
+    assert [p.name for p in tmp_path.iterdir()] == ["stability.json"]
+    assert program.main(["stability", str(path), "-o", str(tmp_path / "out")]) == 0
+
+
 def test_lines_may_come_in_any_order(tmp_path):
     path = write(tmp_path, [line(parameter=p, wrong=w) for p, w in ((100, 9000), (1, 0), (10, 0))])
     assert [s.parameter for s in envelopes(read(path))[0].breaks] == [100]

@@ -224,3 +224,24 @@ def test_geometric_means_cover_the_truth() -> None:
         mean = s.geometric_mean(ratios)
         covered += mean.low <= 2 <= mean.high
     assert covered >= 184  # 95 % of 200, and room for chance
+
+
+def test_exact_rank_sum():
+    """Without ties it is scipy's; with ties it counts the ways to deal the midranks."""
+    from itertools import combinations
+    rng = np.random.default_rng(8)
+    for n, m in ((6, 6), (7, 12), (25, 25)):
+        a, b = rng.normal(0, 1, n), rng.normal(0.7, 1, m)
+        assert s.rank_sum_p(a, b) == pytest.approx(stats.mannwhitneyu(a, b, method="exact").pvalue)
+        assert s.rank_sum_p(np.arange(n), 100.0 + np.arange(m)) == pytest.approx(s.least_rank_sum_p(n, m))
+    a, b = rng.integers(0, 4, 6), rng.integers(1, 5, 7)
+    ranks = stats.rankdata(np.concatenate([a, b]))
+    off = [abs(ranks[list(chosen)].sum() - 6 * ranks.mean()) for chosen in combinations(range(13), 6)]
+    assert s.rank_sum_p(a, b) == pytest.approx(np.mean(np.array(off) >= off[0] - 1e-9))
+    assert s.least_rank_sum_p(30, 30) == pytest.approx(
+        stats.mannwhitneyu(np.arange(30), 100 + np.arange(30), method="asymptotic").pvalue)
+
+
+def test_numbers_that_are_none():
+    assert not any(map(s.is_number, (10**400, float("nan"), float("inf"), True, "1", None, [])))
+    assert s.is_number(10**300)
