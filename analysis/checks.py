@@ -6,28 +6,49 @@ import math
 from dataclasses import dataclass
 from typing import Any, Iterator
 
-from . import nodes, statistics, text
+from . import nodes, severity, statistics, text
 from .comparison import Analysis
+from .contexts import leaves
 from .figures.balance import busy
-from .load import Record
+from .load import Record, Study
+from .severity import GRAVE, NOTE
+from .statistics import is_close
 
-NOT_PUBLISHABLE = "not publishable"
-NOTE = "note"
+NOT_PUBLISHABLE = "not publishable"  # what the report calls a grave one
 P95_SAMPLES = 59  # with fewer, the 95th percentile of a sample says nothing with 95 % confidence
-NEEDED = {"program": ("commit", "compiler", "flags"), "machine": ("cpu", "cpus_allowed", "caches", "governor", "smt", "numa_nodes")}
+NEEDED = {"program": ("commit", "compiler", "flags", "build_id"), "machine": ("cpu", "cpus_allowed", "caches", "governor", "smt", "numa_nodes")}
 
 
 @dataclass(frozen=True)
 class Warn:
-    severity: str
+    grade: str  # of severity.py
     text: str
+
+    @property
+    def severity(self) -> str:
+        return NOT_PUBLISHABLE if self.grade == GRAVE else self.grade
+
+
+def unrecorded(study: Study) -> list[str]:
+    """Keys of the set-up of which context.json, as it was written, says nothing; what is unavailable is said."""
+    raw = study.raw_context
+    silent = [f"{part}.{key}" for part, keys in NEEDED.items() for key in keys if raw[part].get(key) in (None, "")]
+    silent += [part for part in ("libraries", "environment") if raw.get(part) is None]  # no variable set is {}
+    if not raw.get("libraries") and "libraries" not in silent:
+        silent.append("libraries")
+    return silent
+
+
+def unhashed(study: Study) -> list[Record]:
+    """Points of which nothing says what their scene held."""
+    return [record for record in study.every_record if record.ok and not record.config.scene_hash]
 
 
 def check(analysis: Analysis) -> list[Warn]:
     """The grave ones first."""
     found = [warn for rule in (_launches, _samples, _stops, _provenance, _nodes, _jobs, _load, _bases, _pinning, _threads, _floors,
                                _families, _agreement, _images) for warn in rule(analysis)]
-    return sorted(found, key=lambda warn: warn.severity != NOT_PUBLISHABLE)
+    return sorted(found, key=lambda warn: warn.grade != GRAVE)
 
 
 def _some(records: list[Record], analysis: Analysis) -> str:
@@ -39,14 +60,14 @@ def _launches(analysis: Analysis) -> Iterator[Warn]:
     if counts and min(counts) < statistics.MIN_LAUNCHES:
         many = "one launch" if max(counts) == 1 else text.count(min(counts), "launch", "launches")
         many += " for some points" if len(counts) > 1 else ""
-        yield Warn(NOT_PUBLISHABLE, f"{many}: published results need at least {statistics.MIN_LAUNCHES}, because one process has one"
+        yield Warn(severity.FEW_LAUNCHES, f"{many}: published results need at least {statistics.MIN_LAUNCHES}, because one process has one"
                    " memory layout; the intervals here do not cover what another launch would change.")
 
 
 def _samples(analysis: Analysis) -> Iterator[Warn]:
     few = [r for r in analysis.study.timed if r.samples.n < statistics.MIN_SAMPLES]
     if few:
-        yield Warn(NOT_PUBLISHABLE, f"fewer than {statistics.MIN_SAMPLES} samples for {_some(few, analysis)}: they have no interval and"
+        yield Warn(severity.FEW_SAMPLES, f"fewer than {statistics.MIN_SAMPLES} samples for {_some(few, analysis)}: they have no interval and"
                    " nothing is claimed of them.")
 
 
@@ -58,21 +79,22 @@ def _stops(analysis: Analysis) -> Iterator[Warn]:
             wide = f"; the widest interval is ±{text.percent(max(widths))} of its median" if widths else ""
             why = {"time_limit": "the time limit of the study", "point_seconds": "the time limit of a point",
                    "max_samples": "the largest number of samples"}[stop]
-            yield Warn(NOTE, f"{_some(stopped, analysis)} stopped by {why}, not because the interval was within the target{wide}.")
+            yield Warn(severity.STOPPED_BY_LIMIT, f"{_some(stopped, analysis)} stopped by {why}, not because the interval was within the target{wide}.")
     unsaid = [r for r in analysis.study.timed if not r.stop]
     if unsaid:
-        yield Warn(NOTE, f"no stop reason recorded for {_some(unsaid, analysis)}.")
+        yield Warn(severity.NO_STOP, f"no stop reason recorded for {_some(unsaid, analysis)}.")
 
 
 def _provenance(analysis: Analysis) -> Iterator[Warn]:
     context = analysis.study.context
     if context["program"].get("dirty") is not False:
-        yield Warn(NOT_PUBLISHABLE, "the program was built from a dirty commit: its source cannot be had again from the commit."
+        yield Warn(severity.DIRTY, "the program was built from a dirty commit: its source cannot be had again from the commit."
                    if context["program"].get("dirty") else "the record does not say whether the commit was dirty.")
-    silent = [f"{part}.{key}" for part, keys in NEEDED.items() for key in keys if context[part].get(key) in (None, "")]
-    if silent:
-        yield Warn(NOT_PUBLISHABLE, f"the context says nothing of {text.listing(silent, 8)}.")
-    missing = [f"{path} ({value.split(':', 1)[1].strip() if ':' in value else 'no reason'})" for path, value in _leaves(context)
+    if silent := unrecorded(analysis.study):
+        yield Warn(severity.NOT_RECORDED, f"the context says nothing of {text.listing(silent, 8)}.")
+    if nameless := unhashed(analysis.study):
+        yield Warn(severity.NOT_RECORDED, f"no hash of the scene for {text.count(len(nameless), 'timed point')}: another file may have its name.")
+    missing = [f"{path} ({value.split(':', 1)[1].strip() if ':' in value else 'no reason'})" for path, value in leaves(context)
                if isinstance(value, str) and value.startswith("unavailable")]
     if missing:
         yield Warn(NOTE, f"not available on this machine: {text.listing(missing, 6)}.")
@@ -83,9 +105,9 @@ def _nodes(analysis: Analysis) -> Iterator[Warn]:
     types = nodes.node_types(analysis.study.every_record)
     names = nodes.nodes(analysis.study.every_record)
     if mixed := nodes.mixed_groups(analysis):
-        yield Warn(NOT_PUBLISHABLE, f"points that are compared were measured on different nodes: {text.listing(mixed, 4)}.")
+        yield Warn(GRAVE, f"points that are compared were measured on different nodes: {text.listing(mixed, 4)}.")
     if len(types) > 1:
-        yield Warn(NOT_PUBLISHABLE, f"{len(types)} types of nodes: {text.listing(types, 4)}. What goes over several pictures (time against"
+        yield Warn(GRAVE, f"{len(types)} types of nodes: {text.listing(types, 4)}. What goes over several pictures (time against"
                    " work, where each strategy wins, speed against accuracy, sums over scenes) compares machines, too.")
     elif len(names) > 1:
         yield Warn(NOTE, f"measured on {len(names)} nodes of one type ({types[0]}): each picture and numeric mode on one of them, so"
@@ -100,7 +122,7 @@ def _jobs(analysis: Analysis) -> Iterator[Warn]:
     narrow = [job for job in jobs if _is_count(job.get("mask_cpus")) and _is_count(job.get("cpus_per_task"))
               and job["mask_cpus"] < job["cpus_per_task"]]
     if narrow:
-        yield Warn(NOT_PUBLISHABLE, f"{len(narrow)} of {text.count(len(jobs), 'job')} might use fewer CPUs than they reserved (first:"
+        yield Warn(GRAVE, f"{len(narrow)} of {text.count(len(jobs), 'job')} might use fewer CPUs than they reserved (first:"
                    f" {narrow[0]['mask_cpus']} of {narrow[0]['cpus_per_task']} on {narrow[0].get('node')}): threads shared a core.")
     shared = [job for job in jobs if job.get("exclusive") is not True]
     if shared:
@@ -110,14 +132,6 @@ def _jobs(analysis: Analysis) -> Iterator[Warn]:
 
 def _is_count(value: Any) -> bool:
     return isinstance(value, int) and not isinstance(value, bool)
-
-
-def _leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
-    if isinstance(value, dict):
-        for key, item in value.items():
-            yield from _leaves(item, f"{path}.{key}" if path else str(key))
-    else:
-        yield path, value
 
 
 def first_load(value: Any) -> float | None:
@@ -139,7 +153,7 @@ def _load(analysis: Analysis) -> Iterator[Warn]:
     cpus = machine.get("cpus_online")
     cpus = cpus if isinstance(cpus, int) and cpus > 0 else 1
     if load is not None and load > 0.25 * cpus:
-        yield Warn(NOTE, f"load average {load:g} on {text.count(cpus, 'CPU')} at the start: something else was running.")
+        yield Warn(severity.BUSY_MACHINE, f"load average {load:g} on {text.count(cpus, 'CPU')} at the start: something else was running.")
 
 
 def _bases(analysis: Analysis) -> Iterator[Warn]:
@@ -148,10 +162,10 @@ def _bases(analysis: Analysis) -> Iterator[Warn]:
     no_serial = [r for r in parallel if analysis.serial_base[r.id] is None]
     no_thread = [r for r in parallel if analysis.thread_base[r.id] is None]
     if no_serial:
-        yield Warn(NOTE, f"no base (a), a serial kernel with equal picture, numeric mode and instruction set, for"
+        yield Warn(severity.NO_BASE, f"no base (a), a serial kernel with equal picture, numeric mode and instruction set, for"
                    f" {_some(no_serial, analysis)}.")
     if no_thread:
-        yield Warn(NOTE, f"no base (b), the same point on one thread, for {_some(no_thread, analysis)}: they show no efficiency.")
+        yield Warn(severity.NO_BASE, f"no base (b), the same point on one thread, for {_some(no_thread, analysis)}: they show no efficiency.")
     notes: dict[str, int] = {}
     for record in timed:
         for base in (analysis.serial_base[record.id], analysis.thread_base[record.id]):
@@ -159,23 +173,23 @@ def _bases(analysis: Analysis) -> Iterator[Warn]:
             if speedup is not None and speedup.note:
                 notes[speedup.note] = notes.get(speedup.note, 0) + 1
     for note, many in notes.items():
-        yield Warn(NOTE, f"{text.count(many, 'speedup')} with a caveat: {note}.")
+        yield Warn(severity.BASE_CAVEAT, f"{text.count(many, 'speedup')} with a caveat: {note}.")
 
 
 def _pinning(analysis: Analysis) -> Iterator[Warn]:
     loose = [r for r in analysis.study.timed if r.config.threads > 1
              and str(r.config.binding or "none").lower() in ("none", "false", "off")]
     if loose:
-        yield Warn(NOTE, f"threads were not pinned for {_some(loose, analysis)}: the scheduler may have moved them.")
+        yield Warn(severity.NOT_PINNED, f"threads were not pinned for {_some(loose, analysis)}: the scheduler may have moved them.")
 
 
 def _threads(analysis: Analysis) -> Iterator[Warn]:
     fewer = [r for r in analysis.study.timed if r.threads_observed is not None and r.threads_observed < r.config.threads]
     if fewer:
-        yield Warn(NOT_PUBLISHABLE, f"fewer threads ran than were asked for in {_some(fewer, analysis)}.")
+        yield Warn(severity.FEWER_THREADS, f"fewer threads ran than were asked for in {_some(fewer, analysis)}.")
     idle = [r for r in analysis.study.timed if (times := busy(r)) and min(times) < 0.01 * max(times)]
     if idle:
-        yield Warn(NOTE, f"a thread did next to nothing (under 1 % of the busiest one's time) in {_some(idle, analysis)}: these times are"
+        yield Warn(severity.IDLE_THREAD, f"a thread did next to nothing (under 1 % of the busiest one's time) in {_some(idle, analysis)}: these times are"
                    f" those of fewer threads than their label says (first: {analysis.label(idle[0])}).")
     allowed = analysis.study.context["machine"].get("cpus_allowed")
     if isinstance(allowed, list) and allowed:
@@ -188,7 +202,7 @@ def _floors(analysis: Analysis) -> Iterator[Warn]:
     """A limit that is broken was measured wrongly, or is none: the floor assumes stores that go past the caches."""
     below = [r for r in analysis.study.timed if r.floor_ms is not None and analysis.estimates[r.id].value < r.floor_ms]
     if below:
-        yield Warn(NOTE, f"{_some(below, analysis)} took less time than the floor: other load disturbed its measurement, or the picture"
+        yield Warn(severity.BELOW_FLOOR, f"{_some(below, analysis)} took less time than the floor: other load disturbed its measurement, or the picture"
                    " stays in the caches, which ordinary stores can fill faster than streaming stores reach memory.")
 
 
@@ -197,7 +211,7 @@ def _families(analysis: Analysis) -> Iterator[Warn]:
     assumed = [c for group in analysis.groups for c in group.comparisons.values() if c.test == statistics.WELCH]
     if assumed:
         most = max(len(group.timed) - 1 for group in analysis.groups)
-        yield Warn(NOTE, f"too few samples for a rank test among up to {text.count(most, 'comparison')}: {len(assumed)} comparisons with the"
+        yield Warn(severity.ASSUMED_TEST, f"too few samples for a rank test among up to {text.count(most, 'comparison')}: {len(assumed)} comparisons with the"
                    " fastest of a scene use Welch's t test on logarithms instead, which assumes a distribution.")
 
 
@@ -208,32 +222,28 @@ def _agreement(analysis: Analysis) -> Iterator[Warn]:
     run = len([r for r in records if r.raw.get("status") == "ok"])
     planned = counts.get("planned")
     if isinstance(planned, int) and planned != len(records):
-        yield Warn(NOT_PUBLISHABLE, f"the context plans {planned} points, the records hold {len(records)}.")
+        yield Warn(severity.COUNTS_DISAGREE, f"the context plans {planned} points, the records hold {len(records)}.")
     elif isinstance(counts.get("run"), int) and counts["run"] not in (run, len(records)):
-        yield Warn(NOTE, f"the context counts {counts['run']} points as run, the records {run}.")
+        yield Warn(severity.COUNTS_DISAGREE, f"the context counts {counts['run']} points as run, the records {run}.")
     own = study.context.get("id")
     strangers = [r for r in records if own and r.context not in (None, own)]
     if strangers:
-        yield Warn(NOT_PUBLISHABLE, f"{text.count(len(strangers), 'record')} of another context than context.json: their machine or build"
+        yield Warn(severity.OTHER_CONTEXT, f"{text.count(len(strangers), 'record')} of another context than context.json: their machine or build"
                    " may differ.")
     contradicted = [r for r in records if r.raw.get("status") == "ok" and not r.ok]
     if contradicted:
-        yield Warn(NOT_PUBLISHABLE, f"{text.count(len(contradicted), 'record')} with status ok but without a verdict that it conforms:"
+        yield Warn(severity.NOT_CONFORMING, f"{text.count(len(contradicted), 'record')} with status ok but without a verdict that it conforms:"
                    " shown as failed.")
     off = []
     for record in study.timed:
         bounds = statistics.order_interval(record.samples.values)
         stored = record.recorded_interval
-        if (bounds is None) != (stored is None) or (bounds and not all(map(_close, bounds, stored))) or (
-                record.recorded_median is not None and not _close(record.recorded_median, analysis.estimates[record.id].value)):
+        if (bounds is None) != (stored is None) or (bounds and not all(map(is_close, bounds, stored))) or (
+                record.recorded_median is not None and not is_close(record.recorded_median, analysis.estimates[record.id].value)):
             off.append(record)
     if off:
-        yield Warn(NOTE, f"median or interval stored in {_some(off, analysis)} differs from what their samples give; the report uses the"
+        yield Warn(severity.OTHER_STATISTICS, f"median or interval stored in {_some(off, analysis)} differs from what their samples give; the report uses the"
                    f" samples (first: line {off[0].line}).")
-
-
-def _close(a: float, b: float) -> bool:
-    return math.isclose(a, b, rel_tol=1e-4, abs_tol=1e-6)
 
 
 def _images(analysis: Analysis) -> Iterator[Warn]:

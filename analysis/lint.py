@@ -15,9 +15,10 @@ from typing import Any, Callable, Iterator
 
 from . import load, sidecars, text
 from .comparison import Analysis
-from .load import Record
+from .load import InputError, Record
+from .severity import GRAVE
 
-GRAVE, NOTE = "grave", "note"
+PICTURES = (".png", ".svg")
 KEPT, BROKEN, NOTED, NOT_VISIBLE = "kept", "broken", "kept, with notes", "not visible"
 
 
@@ -86,7 +87,7 @@ class Folder:
         if not path.is_file():
             return None
         lines = load.read_text(path).split("\n")
-        return [load.parse(line, path, number) for number, line in enumerate(lines[:-1], start=1) if line.strip()]
+        return [_event(load.parse(line, path, number), path, number) for number, line in enumerate(lines[:-1], start=1) if line.strip()]
 
     @cached_property
     def figures(self) -> list[tuple[str, dict[str, Any]]]:
@@ -94,7 +95,7 @@ class Folder:
         folder = self.directory / "figures"
         found = []
         for path in sorted(folder.glob("*.json")) if folder.is_dir() else ():
-            if not path.name.startswith("."):
+            if any(path.with_suffix(kind).is_file() for kind in PICTURES):  # others' JSON is no figure's
                 found.append((f"figures/{path.name}", sidecars.read(path)))
         return found
 
@@ -103,13 +104,28 @@ class Folder:
         """Pictures in figures/ that nothing beside them describes."""
         folder = self.directory / "figures"
         described = {file for file, _ in self.figures}
-        return [f"figures/{path.name}" for path in sorted(folder.glob("*.png")) if f"figures/{path.stem}.json" not in described]
+        pictures = sorted(path for kind in PICTURES for path in folder.glob(f"*{kind}"))
+        alone = [path for path in pictures if f"figures/{path.stem}.json" not in described]
+        return [f"figures/{path.name}" for path in {path.stem: path for path in reversed(alone)}.values()]  # one a name
 
     def record(self, record: Record, severity: str, problem: str, remedy: str) -> Finding:
         return Finding(severity, f"records.jsonl:{record.line}", record.name, problem, remedy)
 
     def context(self, key: str, severity: str, problem: str, remedy: str) -> Finding:
         return Finding(severity, "context.json", key, problem, remedy)
+
+
+def _event(event: dict[str, Any], path: Path, line: int) -> dict[str, Any]:
+    """An event whose fields that rules read are of their types."""
+    fields: dict[str, Callable[[Any], bool]] = {"event": lambda value: isinstance(value, str)}
+    if event.get("event") in ("sample", "verify"):
+        fields["id"] = lambda value: isinstance(value, str)
+    if event.get("event") == "sample":
+        fields["block"] = fields["launch"] = lambda value: isinstance(value, int) and not isinstance(value, bool)
+    for key, is_right in fields.items():
+        if not is_right(event.get(key)):
+            raise InputError(path, f"{event.get(key)!r} is not what `rasterbench study` writes", line, key)
+    return event
 
 
 def lint(analysis: Analysis, figures: dict[str, bytes] | None = None) -> Result:

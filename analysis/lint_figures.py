@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any, Iterator
 
 from . import style
-from .lint import GRAVE, NOTE, Finding, Folder
+from .lint import Finding, Folder
+from .severity import GRAVE, NOTE
 
 SMALLEST_TEXT = 5.5  # points, at the width of a page
 RATIOS = ("speedup", "efficiency")

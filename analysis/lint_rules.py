@@ -10,13 +10,15 @@ from typing import Any, Iterator
 import numpy as np
 from scipy import stats
 
-from . import checks, lint_figures, statistics, text
+from . import checks, lint_figures, severity, statistics, text
 from .figures.balance import busy
-from .lint import GRAVE, NOTE, Finding, Folder, Rule
+from .lint import Finding, Folder, Rule
 from .load import Record
-from .statistics import is_number
+from .severity import GRAVE, NOTE
+from .statistics import is_close, is_number
 
 DRIFT_P = 1e-3  # of Spearman's rank correlation between time and order
+ORDER_P = 1e-3  # of as many identical orders by chance
 OUTLIER = 3.0  # times the median
 STAGE_ROUNDING = 1e-3  # of a sample, by which its stages may exceed it
 
@@ -30,16 +32,16 @@ def base_case(folder: Folder) -> Iterator[Finding]:
                  "(b), the same point on one thread": analysis.thread_base[record.id]}
         for name, base in bases.items():
             if base is None:
-                yield folder.record(record, NOTE, f"no base {name}", "add it to the sweep: without it no speedup is shown")
+                yield folder.record(record, severity.NO_BASE, f"no base {name}", "add it to the sweep: without it no speedup is shown")
             elif base is not record and (speedup := analysis.speedup(record, base)) and speedup.note:
-                yield folder.record(record, GRAVE, f"base {name}: {speedup.note}", "measure the base in every block of the point")
+                yield folder.record(record, severity.BASE_CAVEAT, f"base {name}: {speedup.note}", "measure the base in every block of the point")
 
 
 def two_verdicts(folder: Folder) -> Iterator[Finding]:
     for record in folder.study.every_record:
         raw = record.raw
         if raw.get("status") == "ok" and not record.ok:
-            yield folder.record(record, GRAVE, f"status ok, but {record.reason}", "verify it; such a point shows no speed")
+            yield folder.record(record, severity.NOT_CONFORMING, f"status ok, but {record.reason}", "verify it; such a point shows no speed")
         if raw.get("status") != "ok" and raw.get("samples_ms"):
             yield folder.record(record, GRAVE, f"status {raw['status']} with times", "run it again: what failed has no times")
         if record.ok and not record.config.is_peer and not any(record.verify.get(k) for k in ("oracle", "end_to_end", "embree")):
@@ -59,11 +61,8 @@ def subsets(folder: Folder) -> Iterator[Finding]:
             yield folder.context(f"points.{key}", GRAVE, "not recorded", "run the study again, or say how many points were left out")
         # `run` of a study that failed points ran, too, counts them in some versions
         elif counts[key] != many and not (key == "run" and counts[key] == many + found["failed"]):
-            yield folder.context(f"points.{key}", GRAVE, f"{counts[key]}, the records hold {many}",
+            yield folder.context(f"points.{key}", severity.COUNTS_DISAGREE, f"{counts[key]}, the records hold {many}",
                                  "keep every record of a study: leaving points out selects")
-    for record in folder.study.every_record:
-        if record.status != "ok" and not record.raw.get("reason") and not record.reason:
-            yield folder.record(record, GRAVE, f"{record.status} without a reason", "record why")
 
 
 def means(folder: Folder) -> Iterator[Finding]:
@@ -71,9 +70,9 @@ def means(folder: Folder) -> Iterator[Finding]:
         median = float(np.median(record.samples.values))
         if record.recorded_median is None:
             yield folder.record(record, NOTE, "no median recorded", "write the median beside the samples")
-        elif not math.isclose(record.recorded_median, median, rel_tol=1e-4, abs_tol=1e-6):
+        elif not is_close(record.recorded_median, median):
             kind = "their mean" if math.isclose(record.recorded_median, float(np.mean(record.samples.values)), rel_tol=1e-6) else "not theirs"
-            yield folder.record(record, GRAVE, f"median_ms {record.recorded_median:g}, the samples give {median:g} ({kind})",
+            yield folder.record(record, severity.OTHER_STATISTICS, f"median_ms {record.recorded_median:g}, the samples give {median:g} ({kind})",
                                 "compute it from the samples")
 
 
@@ -97,15 +96,15 @@ def confidence(folder: Folder) -> Iterator[Finding]:
     for record in folder.timed:
         samples, raw = record.samples, record.raw
         if samples.launch_count < statistics.MIN_LAUNCHES:
-            yield folder.record(record, GRAVE, text.count(samples.launch_count, "launch", "launches"),
+            yield folder.record(record, severity.FEW_LAUNCHES, text.count(samples.launch_count, "launch", "launches"),
                                 f"set sampling.launches to {statistics.MIN_LAUNCHES} or more: one process has one memory layout")
         if samples.n < statistics.MIN_SAMPLES:
-            yield folder.record(record, GRAVE, text.count(samples.n, "sample"), "set sampling.min_samples to 6 or more: fewer have no"
+            yield folder.record(record, severity.FEW_SAMPLES, text.count(samples.n, "sample"), "set sampling.min_samples to 6 or more: fewer have no"
                                 " interval")
         bounds = statistics.order_interval(samples.values)
         stored = record.recorded_interval
-        if (bounds is None) != (stored is None) or bounds and not all(map(_close, bounds, stored)):
-            yield folder.record(record, GRAVE, f"interval_ms {stored}, the samples give {bounds}", "compute it from the samples")
+        if (bounds is None) != (stored is None) or bounds and not all(map(is_close, bounds, stored)):
+            yield folder.record(record, severity.OTHER_STATISTICS, f"interval_ms {stored}, the samples give {bounds}", "compute it from the samples")
         if samples.n < checks.P95_SAMPLES and raw.get("p95_ms") is not None:
             yield folder.record(record, GRAVE, f"a 95th percentile of {text.count(samples.n, 'sample')}",
                                 f"show none below {checks.P95_SAMPLES}: the largest sample is no percentile")
@@ -114,12 +113,12 @@ def confidence(folder: Folder) -> Iterator[Finding]:
 def stopping(folder: Folder) -> Iterator[Finding]:
     for record in folder.timed:
         if not record.stop:
-            yield folder.record(record, GRAVE, "no reason for its last sample", "record why sampling stopped")
+            yield folder.record(record, severity.NO_STOP, "no reason for its last sample", "record why sampling stopped")
         elif record.stop == "target" and not _reached(record.samples.values, folder.study.target):
             yield folder.record(record, GRAVE, f"stopped by target, but its interval never was within {text.percent(folder.study.target)}",
                                 "sample until the interval is within the target, or record the limit that stopped it")
         elif record.stop != "target":
-            yield folder.record(record, NOTE, f"stopped by {record.stop}, not by its interval", "raise that limit, or state the interval")
+            yield folder.record(record, severity.STOPPED_BY_LIMIT, f"stopped by {record.stop}, not by its interval", "raise that limit, or state the interval")
 
 
 def _reached(values: np.ndarray, target: float) -> bool:
@@ -135,37 +134,59 @@ def comparison(folder: Folder) -> Iterator[Finding]:
     for group in folder.analysis.groups:
         assumed = [c for c in group.comparisons.values() if c.test in (statistics.WELCH, "none") and c.verdict != "best"]
         if assumed:
-            yield Finding(NOTE, "records.jsonl", group.title, f"too few samples for a rank test in {text.count(len(assumed), 'comparison')}"
+            yield Finding(severity.ASSUMED_TEST, "records.jsonl", group.title, f"too few samples for a rank test in {text.count(len(assumed), 'comparison')}"
                           " with the fastest", "take more samples or blocks, or compare fewer points")
 
 
 def raw_data(folder: Folder) -> Iterator[Finding]:
-    taken = Counter(event.get("id") for event in folder.journal or () if event.get("event") == "sample")
     for record in folder.timed:
         values, raw = record.samples.values, record.raw
         for key, value in (("min_ms", values.min()), ("max_ms", values.max())):
             if raw.get(key) is None:
                 yield folder.record(record, NOTE, f"no {key}", "store the extremes: the largest time is a result, too")
-            elif is_number(raw[key]) and not _close(raw[key], float(value)):
+            elif is_number(raw[key]) and not is_close(raw[key], float(value)):
                 yield folder.record(record, GRAVE, f"{key} {raw[key]:g}, the samples give {value:g}: samples were dropped",
                                     "store every sample; label outliers, never drop them")
-        if taken and taken[record.id] != len(values):
-            yield folder.record(record, GRAVE, f"{len(values)} samples, the journal has {taken[record.id]}",
+
+
+def journalled(folder: Folder) -> Iterator[Finding]:
+    taken = Counter(event["id"] for event in _samples(folder))
+    for record in folder.timed:
+        if taken[record.id] != record.samples.n:
+            yield folder.record(record, GRAVE, f"{text.count(record.samples.n, 'sample')}, the journal has {taken[record.id]}",
                                 "make records from the whole journal")
+    for identity in sorted(taken.keys() - {record.id for record in folder.study.every_record}):
+        yield Finding(GRAVE, "journal.jsonl", identity, "was sampled and has no record", "make the records from the whole journal")
 
 
-def order(folder: Folder) -> Iterator[Finding]:
+def _samples(folder: Folder) -> Iterator[dict[str, Any]]:
+    return (event for event in folder.journal or () if event["event"] == "sample")
+
+
+def blocks(folder: Folder) -> Iterator[Finding]:
     for record in folder.timed:
         pairs = list(zip(record.samples.launches.tolist(), record.samples.blocks.tolist()))
         if len(set(pairs)) < len(pairs):
             yield folder.record(record, GRAVE, "several samples in one block", "take every point once per block")
-    blocks: dict[tuple, list[str]] = {}
-    for event in folder.journal or ():
-        if event.get("event") == "sample":
-            blocks.setdefault((event.get("launch"), event.get("block")), []).append(str(event.get("id")))
-    whole = [tuple(ids) for ids in blocks.values() if len(ids) == max(map(len, blocks.values()))]
-    if len(whole) >= 3 and len(whole[0]) >= 4 and len(set(whole)) == 1:
-        yield Finding(GRAVE, "journal.jsonl", "samples", f"the order of the points is the same in all {len(whole)} complete blocks",
+
+
+def order(folder: Folder) -> Iterator[Finding]:
+    """Of k points that two blocks share, chance gives both the same order once in k!."""
+    taken: dict[tuple[int, int], list[str]] = {}
+    for event in _samples(folder):
+        taken.setdefault((event["launch"], event["block"]), []).append(event["id"])
+    orders = list(taken.values())
+    identical, expected, most = 0, 0.0, 0
+    for left, right in zip(orders, orders[1:]):
+        shared = set(left) & set(right)
+        if len(shared) < 2:
+            continue
+        expected += 1 / math.factorial(len(shared))
+        if [i for i in left if i in shared] == [i for i in right if i in shared]:
+            identical, most = identical + 1, max(most, len(shared))
+    if identical and stats.poisson.sf(identical - 1, expected) < ORDER_P:
+        yield Finding(GRAVE, "journal.jsonl", "samples", f"{text.count(identical, 'pair')} of consecutive blocks took up to"
+                      f" {text.count(most, 'point')} in the same order, where chance has {expected:.2g}",
                       "shuffle each block: else drift and caches favour the same points each time")
 
 
@@ -183,36 +204,36 @@ def clock(folder: Folder) -> Iterator[Finding]:
 def set_up(folder: Folder) -> Iterator[Finding]:
     context = folder.study.context
     if context["program"].get("dirty") is not False:
-        yield folder.context("program.dirty", GRAVE, "built from a dirty commit" if context["program"].get("dirty") else "not recorded",
+        yield folder.context("program.dirty", severity.DIRTY, "built from a dirty commit" if context["program"].get("dirty") else "not recorded",
                              "commit, build and run again: nobody else has this source")
-    for part, keys in checks.NEEDED.items():
-        for key in keys:
-            if context[part].get(key) in (None, ""):
-                yield folder.context(f"{part}.{key}", GRAVE, "not recorded", "record it, or \"unavailable: REASON\"")
+    for key in checks.unrecorded(folder.study):
+        yield folder.context(key, severity.NOT_RECORDED, "not recorded", "record it, or \"unavailable: REASON\"")
+    for record in checks.unhashed(folder.study):
+        yield folder.record(record, severity.NOT_RECORDED, "no config.scene_hash", "record the hash of the scene: another file may have its name")
     for record in folder.study.every_record:
         if context.get("id") and record.context not in (None, context["id"]):
-            yield folder.record(record, GRAVE, "recorded under another context than context.json", "never mix machines or builds")
+            yield folder.record(record, severity.OTHER_CONTEXT, "recorded under another context than context.json", "never mix machines or builds")
         if not record.ok:
             continue
         if record.threads_observed is None:
             yield folder.record(record, NOTE, "threads that ran were not observed", "observe them: a binding may leave one worker")
         elif record.threads_observed < record.config.threads:
-            yield folder.record(record, GRAVE, f"{record.threads_observed} of {text.count(record.config.threads, 'thread')} ran",
+            yield folder.record(record, severity.FEWER_THREADS, f"{record.threads_observed} of {text.count(record.config.threads, 'thread')} ran",
                                 "remove what limits them (binding, cgroup), or ask for fewer")
         if record.config.threads > 1 and str(record.config.binding or "none").lower() in ("none", "false", "off"):
-            yield folder.record(record, NOTE, "its threads were not pinned", "add binding = [\"close\"] to the study")
+            yield folder.record(record, severity.NOT_PINNED, "its threads were not pinned", "add binding = [\"close\"] to the study")
         times = busy(record)
         if times and min(times) < 0.01 * max(times):
-            yield folder.record(record, NOTE, "a thread did next to nothing", "read its time as that of fewer threads")
+            yield folder.record(record, severity.IDLE_THREAD, "a thread did next to nothing", "read its time as that of fewer threads")
 
 
 def noise(folder: Folder) -> Iterator[Finding]:
     machine = folder.study.context["machine"]
     load, cpus = checks.first_load(machine.get("load_average")), machine.get("cpus_online")
-    if load is None:
+    if load is None and not str(machine.get("load_average")).startswith("unavailable: "):
         yield folder.context("machine.load_average", GRAVE, "not recorded", "record it, or \"unavailable: REASON\"")
-    elif load > 0.25 * (cpus if isinstance(cpus, int) and cpus > 0 else 1):
-        yield folder.context("machine.load_average", NOTE, f"{load:g} at the start: something else was running", "run on a quiet machine")
+    elif load is not None and load > 0.25 * (cpus if isinstance(cpus, int) and cpus > 0 else 1):
+        yield folder.context("machine.load_average", severity.BUSY_MACHINE, f"{load:g} at the start: something else was running", "run on a quiet machine")
     for record in folder.timed:
         values, target = record.samples.values, folder.study.target
         slow = int(np.sum(values > OUTLIER * np.median(values)))
@@ -233,13 +254,16 @@ def verification(folder: Folder) -> Iterator[Finding]:
     for record in folder.study.timed:
         if not record.verify.get("checked_against"):
             yield folder.record(record, GRAVE, "not said what it was checked against", "verify it against the scalar specification")
-    verified: set[Any] = set()
+
+
+def verified_first(folder: Folder) -> Iterator[Finding]:
+    verified: set[str] = set()
     for event in folder.journal or ():
-        if event.get("event") == "verify":
-            verified |= {event.get("id"), *(event.get("ids") or ())}
-        elif event.get("event") == "sample" and event.get("id") not in verified:
-            verified.add(event.get("id"))  # once a point
-            yield Finding(GRAVE, "journal.jsonl", str(event.get("id")), "timed before it was verified", "verify, then time")
+        if event["event"] == "verify":
+            verified.add(event["id"])
+        elif event["event"] == "sample" and event["id"] not in verified:
+            verified.add(event["id"])  # once a point
+            yield Finding(GRAVE, "journal.jsonl", event["id"], "timed before it was verified", "verify, then time")
 
 
 def bounds(folder: Folder) -> Iterator[Finding]:
@@ -247,7 +271,7 @@ def bounds(folder: Folder) -> Iterator[Finding]:
         if record.floor_ms is None:
             yield folder.record(record, NOTE, "no floor", "let the study measure the memory bandwidth")
         elif folder.analysis.estimates[record.id].value < record.floor_ms:
-            yield folder.record(record, NOTE, "faster than its floor", "measure the bandwidth again: other load disturbed it, or caches"
+            yield folder.record(record, severity.BELOW_FLOOR, "faster than its floor", "measure the bandwidth again: other load disturbed it, or caches"
                                 " held the picture")
 
 
@@ -256,14 +280,6 @@ def crash(folder: Folder) -> Iterator[Finding]:
         if not (folder.directory / name).read_bytes().endswith(b"\n"):
             yield Finding(NOTE if name == "context.json" else GRAVE, name, "end", "its last line has no end: it was not written whole",
                           "make it again from the journal: rasterbench study --resume")
-    known = {record.id for record in folder.study.every_record}
-    lost = sorted({str(event.get("id")) for event in folder.journal or () if event.get("event") == "sample" and event.get("id") not in known})
-    for identity in lost:
-        yield Finding(GRAVE, "journal.jsonl", identity, "was sampled and has no record", "make the records from the whole journal")
-
-
-def _close(a: float, b: float) -> bool:
-    return math.isclose(a, b, rel_tol=1e-4, abs_tol=1e-6)
 
 
 RULES = (
@@ -276,11 +292,14 @@ RULES = (
     Rule("stopping", "a point stops by its interval or says which limit stopped it", stopping),
     Rule("comparison", "differences come from rank tests", comparison),
     Rule("raw-data", "every sample is stored, outliers included", raw_data),
-    Rule("order", "randomised complete blocks", order),
+    Rule("journal", "the records hold every sample of the journal, and no other", journalled, "journal"),
+    Rule("blocks", "every point once a block", blocks),
+    Rule("order", "randomised blocks", order, "journal"),
     Rule("clock", "the timed region is named, and its parts fit into it", clock),
     Rule("set-up", "machine, build and observed threads are recorded", set_up),
     Rule("noise", "load, drift and outliers are labelled", noise),
-    Rule("verification", "checked before it was timed", verification),
+    Rule("verification", "says what it was checked against", verification),
+    Rule("verified-first", "checked before it was timed", verified_first, "journal"),
     Rule("bounds", "the measured floor stands beside the times", bounds),
     Rule("plot-caption", "a figure says n, interval and machine", lint_figures.caption, "figures"),
     Rule("plot-base", "a figure of speedups names its base", lint_figures.base, "figures"),
@@ -288,6 +307,6 @@ RULES = (
     Rule("plot-legible", "a figure fits a page and its text can be read", lint_figures.legible, "figures"),
     Rule("plot-grey", "a legend can be told apart without colours", lint_figures.grey, "figures"),
     Rule("plot-current", "a figure was drawn from these records", lint_figures.current, "figures"),
-    Rule("crash", "records are whole, and hold all of the journal", crash),
+    Rule("crash", "records and context were written whole", crash),
     Rule("exit", "a failed point makes the exit status non-zero", None, why_not="no file holds the exit status; tests/ has it"),
 )

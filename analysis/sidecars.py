@@ -91,7 +91,7 @@ def _categorical(axis: Any) -> bool:
 
 def _number(words: str) -> bool:
     try:
-        float(words.replace("\N{MINUS SIGN}", "-").rstrip("x%\N{MULTIPLICATION SIGN} "))
+        float(words.replace("\N{MINUS SIGN}", "-").replace(",", "").rstrip("x%\N{MULTIPLICATION SIGN} "))
     except ValueError:
         return False
     return True

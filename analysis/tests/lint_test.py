@@ -11,10 +11,10 @@ import pytest
 from matplotlib.figure import Figure
 
 from .. import __main__ as program
-from .. import lint, lint_rules, sidecars, style
+from .. import checks, lint, lint_rules, sidecars, style
 from ..captions import Caption
 from ..figures.common import Drawing
-from . import synthetic
+from . import synthetic, synthetic_modes
 from .conftest import FEW, analyse
 
 IDS = [rule.id for rule in lint_rules.RULES]
@@ -142,7 +142,8 @@ def first(change):
     ("stopping", "note", first(lambda r: r.update(stop="point_seconds")), ()),
     ("raw-data", "grave", first(lambda r: r.update(max_ms=r["max_ms"] / 2)), ()),
     ("raw-data", "note", first(lambda r: r.update(min_ms=None)), ()),
-    ("order", "grave", first(one_block), ()),
+    ("blocks", "grave", first(one_block), ()),
+    ("set-up", "grave", first(lambda r: r["config"].pop("scene_hash")), ("base-case",)),
     ("clock", "grave", first(lambda r: r.pop("frames_per_sample")), ()),
     ("clock", "grave", first(slow_stages), ()),
     ("set-up", "grave", first(lambda r: r.update(threads_observed=1)), ()),
@@ -195,6 +196,9 @@ def test_a_base_that_was_sampled_on_after_its_target(tmp_path):
     ("clock", "grave", lambda c: c.pop("region")),
     ("set-up", "grave", lambda c: c["program"].update(dirty=True)),
     ("set-up", "grave", lambda c: c["program"].pop("flags")),
+    ("set-up", "grave", lambda c: c["program"].pop("build_id")),
+    ("set-up", "grave", lambda c: c.pop("libraries")),
+    ("set-up", "grave", lambda c: c.pop("environment")),
     ("set-up", "grave", lambda c: c["machine"].update(governor="")),
     ("noise", "grave", lambda c: c["machine"].pop("load_average")),
     ("noise", "note", lambda c: c["machine"].update(load_average=[3.5, 1, 1])),
@@ -218,10 +222,10 @@ def unshuffled(events, entries):
 
 
 @pytest.mark.parametrize("rule, change", [
-    ("raw-data", lambda events, entries: events[:-1]),
+    ("journal", lambda events, entries: events[:-1]),
     ("order", unshuffled),
-    ("verification", lambda events, entries: [e for e in events if e.get("id") != entries[3]["id"] or e["event"] != "verify"]),
-    ("crash", lambda events, entries: [*events, {"event": "verify", "id": "lost"}, {"event": "sample", "launch": 0, "block": 0, "id": "lost"}]),
+    ("verified-first", lambda events, entries: [e for e in events if e.get("id") != entries[3]["id"] or e["event"] != "verify"]),
+    ("journal", lambda events, entries: [*events, {"event": "verify", "id": "lost"}, {"event": "sample", "launch": 0, "block": 0, "id": "lost"}]),
 ])
 def test_journals(tmp_path, rule, change):
     directory = write(tmp_path / "a")
@@ -230,6 +234,63 @@ def test_journals(tmp_path, rule, change):
     assert broken(directory) == set()
     journal(directory, change)
     assert broken(directory, "grave") == {rule}
+
+
+def test_rules_of_the_journal_are_not_visible_without_one(tmp_path):
+    directory = write(tmp_path / "a")
+    hidden = {"journal", "order", "verified-first"}
+    verdict = {v.rule.id: v.words for v in lint.lint(analyse(directory)).verdicts}
+    assert {verdict[rule] for rule in hidden} == {lint.NOT_VISIBLE}
+    journal(directory)
+    verdict = {v.rule.id: v.words for v in lint.lint(analyse(directory)).verdicts}
+    assert {verdict[rule] for rule in hidden} == {lint.KEPT}
+
+
+def test_one_block_that_differs_does_not_hide_a_fixed_order(tmp_path):
+    def nearly(events, entries):
+        fixed = unshuffled(events, entries)
+        places = [i for i, e in enumerate(fixed) if e["event"] == "sample" and (e["launch"], e["block"]) == (2, 3)]
+        fixed[places[0]], fixed[places[1]] = fixed[places[1]], fixed[places[0]]
+        return fixed
+
+    directory = write(tmp_path / "a")
+    journal(directory, nearly)
+    assert broken(directory, "grave") == {"order"}
+
+
+def test_two_points_have_the_same_order_by_chance(tmp_path):
+    """Half of the pairs of blocks do: that is no fixed order."""
+    directory = write(tmp_path / "a", kernels=["scanline", "bounding_box"], schedules=[])
+    journal(directory)
+    assert "order" not in broken(directory)
+    journal(directory, unshuffled)
+    assert "order" in broken(directory)
+
+
+@pytest.mark.parametrize("event, field", [({"event": "sample", "id": [1]}, "id"), ({"event": "verify", "id": 5}, "id"), ({}, "event"),
+                                          ({"event": "sample", "id": "x", "block": 0, "launch": {}}, "launch"),
+                                          ({"event": "sample", "id": "x", "block": "1", "launch": 0}, "block"), ({"event": []}, "event")])
+def test_events_of_wrong_types(tmp_path, capsys, event, field):
+    directory = write(tmp_path / "a")
+    journal(directory, lambda events, entries: [*events, event])
+    assert program.main(["lint", str(directory)]) == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1 and "journal.jsonl:" in err and f" {field}: " in err
+
+
+def test_an_unavailable_load_is_recorded(tmp_path):
+    directory = write(tmp_path / "a")
+    rewrite_context(directory, lambda c: c["machine"].update(load_average="unavailable: no /proc"))
+    assert broken(directory) == set()
+
+
+def test_a_report_and_lint_are_of_one_mind(tmp_path):
+    """What lint calls grave, the report calls not publishable."""
+    for name, change in (("stop", lambda r: r.update(stop=None)), ("interval", lambda r: r.update(interval_ms=[1.0, 2.0])),
+                         ("base", None)):
+        directory = write(tmp_path / name, first(change) if change else other_blocks)
+        assert broken(directory, "grave")
+        assert checks.NOT_PUBLISHABLE in {warn.severity for warn in checks.check(analyse(directory))}, name
 
 
 def test_an_interrupted_line_of_the_journal_is_none(tmp_path):
@@ -276,6 +337,30 @@ def test_a_picture_that_nothing_describes(tmp_path, reported):
     (directory / "figures/by_hand.png").write_bytes(b"")
     result = lint.lint(analyse(directory))
     assert [(v.rule.id, f.file) for v in result.verdicts for f in v.findings] == [("plot-caption", "figures/by_hand.png")]
+
+
+def test_a_vector_picture_and_what_is_no_sidecar(tmp_path, reported):
+    directory = shutil.copytree(reported, tmp_path / "a")
+    (directory / "figures/numbers.json").write_text("[1]")  # no picture beside it: somebody's data
+    (directory / "figures/by_hand.svg").write_text("")
+    assert {f.file for f in lint.lint(analyse(directory)).findings} == {"figures/by_hand.svg"}
+
+
+def test_a_report_on_accuracy_keeps_the_rules_of_figures(tmp_path):
+    """Its axes are logarithms with labels of their own, such as 1,000."""
+    plan = synthetic.plan(scenes={"layers": (20000, 60.0, [1280, 720])}, kernels=["bounding_box", "tile_parallel"], schedules=FEW[:1],
+                          threads=[1], untimed=False, launches=5, blocks=3, edit=synthetic_modes.spread(synthetic_modes.MODES, hardness=(8.0,)))
+    directory = synthetic.write(tmp_path / "a", plan)
+    assert program.main(["report", str(directory)]) == 0
+    pareto = [path for path in (directory / "figures").glob("pareto_*.json")]
+    assert pareto and any(f.is_file() for f in pareto)
+    found = [f for v in lint.lint(analyse(directory)).verdicts if v.rule.id == "plot-lines" for f in v.findings]
+    assert found == []
+
+
+def test_labels_with_thousands_are_numbers():
+    assert not drawn(lambda axes: (axes.plot([0, 3], [1, 2]), axes.set_xticks([0, 3], ["1", "1,000"])))["lines_across_categories"]
+    assert drawn(lambda axes: (axes.plot([0, 3], [1, 2]), axes.set_xticks([0, 3], ["a, b", "c"])))["lines_across_categories"]
 
 
 @pytest.mark.parametrize("key, value", [("size_inches", "x"), ("facts", []), ("axes", None), ("alike_in_grey", [["a"]]), ("schema", 2),

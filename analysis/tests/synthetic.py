@@ -130,7 +130,7 @@ def context(p: Plan, records: list[dict[str, Any]]) -> dict[str, Any]:
     return {
         "schema": 1, "id": "c0ffee", "started": "2024-05-01T10:00:00Z", "finished": "2024-05-01T10:03:10Z",
         "program": {"version": "0.1", "commit": "0123abc", "dirty": False, "compiler": "g++ 12.2.0", "flags": "-O3",
-                    "build_type": "Release"},
+                    "build_type": "Release", "build_id": "b01d"},
         "libraries": {"google_benchmark": "1.7.1", "tbb": "2021.8", "openmp": "libgomp 201511"},
         "machine": {"hostname": "node_1", "cpu": "Example CPU 9000 @ 2.0 GHz", "cpus_online": 4, "cpus_allowed": [0, 1, 2, 3],
                     "cores": 4, "packages": 1, "numa_nodes": 1, "smt": False,
