@@ -22,6 +22,12 @@ std::vector<double> paired_ratios(const LabelSamples& a, const LabelSamples& b) 
 
 }  // namespace
 
+std::optional<int> least_found(int comparisons, double stated_rate) {
+  for (int differences = 1; differences <= comparisons; ++differences)
+    if (proportion_interval(differences, comparisons).first > stated_rate) return differences;
+  return std::nullopt;
+}
+
 SelfComparison compare_with_itself(const SamplingPlan& plan, std::uint64_t seed, int frames,
                                    FunctionRef<double(int label, int block)> sample) {
   SelfComparison comparison;

@@ -31,6 +31,10 @@ struct SelfComparison {
   bool differs() const { return interval && (interval->first > 1 || interval->second < 1); }
 };
 
+/// The least number of `comparisons` whose exact 95 % interval lies above `stated_rate` if so many came out
+/// different: what so many comparisons can find. None if not even all of them would.
+std::optional<int> least_found(int comparisons, double stated_rate);
+
 /// Samples both labels as a study samples two points (randomised blocks, each label until the stopping rule
 /// closes it) and compares them. `sample(label, block)` takes one sample, the mean of `frames` frames, in
 /// milliseconds. `seed` decides the order within the blocks.

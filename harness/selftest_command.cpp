@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 
+#include <fstream>
 #include <map>
 #include <memory>
+#include <optional>
 
 #include "base/error.h"
 #include "harness/commands.h"
@@ -90,19 +92,38 @@ Json comparison_json(const SelfComparison& comparison, int index, int launches) 
   return json;
 }
 
+/// What so many comparisons are able to find, in words.
+std::string power(int comparisons) {
+  const std::optional<int> least = least_found(comparisons, kStatedRate);
+  if (!least)
+    return fmt::format("{} comparisons cannot show a rate above {:g} %, whatever comes out", comparisons,
+                       100 * kStatedRate);
+  return fmt::format("so many comparisons show a rate above {:g} % from {} differences on, which is {:.1f} %",
+                     100 * kStatedRate, *least, 100.0 * *least / comparisons);
+}
+
 int run_selftest(const SelftestOptions& options, const DrawOptions& draw_options) {
   if (!options.output.empty()) check_output_path(options.output);
+  if (options.sampling.max_samples < options.sampling.launches)
+    throw InputError({.field = "--max-samples"}, "is less than --launches: some would hold no sample");
   if (options.sampling.max_samples < options.sampling.min_samples)
     throw InputError({.field = "--max-samples"}, "is less than --min-samples");
   const Point point = point_of(draw_options, options.model, options.scene_file);
   catch_interrupts();
-  std::string lines;
+  std::ofstream lines;
+  const auto check_lines = [&] {
+    if (!lines) throw Error(options.output + ": cannot be written");
+  };
   std::vector<double> off;  // how far each ratio is from 1
   std::size_t samples = 0;
   int differences = 0, on_target = 0;
   {
     Progress progress;
     const int frames = verified_frames(point);
+    if (!options.output.empty()) {
+      lines.open(options.output, std::ios::binary);
+      check_lines();
+    }
     for (int i = 0; i < options.comparisons; ++i) {
       progress.show("comparing a point with itself", i, options.comparisons,
                     fmt::format("{} came out different", differences));
@@ -113,11 +134,15 @@ int run_selftest(const SelftestOptions& options, const DrawOptions& draw_options
         samples += label.times_ms.size();
         on_target += label.stop == "target";
       }
-      lines += dump(comparison_json(comparison, i, options.sampling.launches)) + "\n";
+      // At once, so that a run that ends early keeps what it has measured.
+      if (!options.output.empty()) {
+        lines << dump(comparison_json(comparison, i, options.sampling.launches)) << '\n' << std::flush;
+        check_lines();
+      }
     }
   }
-  if (!options.output.empty()) write_file(options.output, lines);
   const auto [low, high] = proportion_interval(differences, options.comparisons);
+  const std::optional<int> least = least_found(options.comparisons, kStatedRate);
   const bool broken = low > kStatedRate;
   if (options.json) {
     fmt::print("{}\n", dump({{"point", point_config(point)},
@@ -129,6 +154,7 @@ int run_selftest(const SelftestOptions& options, const DrawOptions& draw_options
                              {"median_off", median(off)},
                              {"samples", samples},
                              {"stopped_by_target", on_target},
+                             {"least_found", least ? Json(*least) : Json()},
                              {"kept", !broken}},
                             2));
   } else {
@@ -136,10 +162,10 @@ int run_selftest(const SelftestOptions& options, const DrawOptions& draw_options
         "{} of {} comparisons of a point with itself came out different: {:.1f} % [{:.1f}, {:.1f}], stated "
         "{:g} %\n"
         "half of the ratios are within {:.2f} % of 1; {:.1f} samples a label, {} of {} labels stopped by "
-        "target\n{}\n",
+        "target\n{}\n{}\n",
         differences, options.comparisons, 100.0 * differences / options.comparisons, 100 * low, 100 * high,
         100 * kStatedRate, 100 * median(off), static_cast<double>(samples) / (2.0 * options.comparisons),
-        on_target, 2 * options.comparisons,
+        on_target, 2 * options.comparisons, power(options.comparisons),
         broken ? "BROKEN: more often than stated; intervals on this machine are too narrow"
                : "no more often than stated, as far as so many comparisons can tell");
     if (!options.output.empty()) fmt::print("wrote {}\n", options.output);

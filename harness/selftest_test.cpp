@@ -73,5 +73,13 @@ TEST(Selftest, ProportionInterval) {
   EXPECT_TRUE(near(proportion_interval(100, 100), 0.9638, 1));
 }
 
+// Of 40, 6 have the interval [5.71, 29.84] %, and 5 have [4.19, 26.80] %; one of one has [2.5, 100] %.
+TEST(Selftest, TheLeastRateThatCanBeFound) {
+  EXPECT_EQ(least_found(40, 0.05), 6);
+  EXPECT_EQ(least_found(2, 0.05), 2);
+  EXPECT_EQ(least_found(1, 0.05), std::nullopt);
+  EXPECT_EQ(least_found(100, 0), 1);
+}
+
 }  // namespace
 }  // namespace rasterbench

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy import stats
 
-from .program import json_lines, run
+from .program import TIMEOUT, command, environment, json_lines, run
 
 SMALL = ("teapot:triangles=300", "--size", "64x48", "--backend", "serial")
 
@@ -43,14 +45,29 @@ def test_every_sample_and_the_rate(tmp_path: Path) -> None:
     assert value["kept"] == (expected.low <= 0.05) and done.code == (0 if value["kept"] else 1)
 
 
+def test_a_comparison_is_written_when_it_is_done(tmp_path: Path) -> None:
+    """A run that is killed keeps what it has measured."""
+    out = tmp_path / "self.jsonl"
+    with subprocess.Popen(command("selftest", *SMALL, "--comparisons", 100000, "-o", out), stdout=subprocess.DEVNULL,
+                          stderr=subprocess.DEVNULL, env=environment()) as process:
+        until = time.monotonic() + TIMEOUT
+        while (not out.exists() or out.read_text().count("\n") < 2) and time.monotonic() < until and process.poll() is None:
+            time.sleep(0.05)
+        process.kill()
+    whole = out.read_text().split("\n")[:-1]
+    assert [json.loads(line)["comparison"] for line in whole][:2] == [0, 1]
+
+
 def test_words() -> None:
     done = run("selftest", *SMALL, "--comparisons", 1, "--launches", 1, "--max-samples", 10)
+    assert "1 comparisons cannot show a rate above 5 %" in done.stdout
     assert "of 1 comparisons of a point with itself came out different" in done.stdout and "stated 5 %" in done.stdout
 
 
 @pytest.mark.parametrize("options, field", [
     (("--comparisons", "0"), "--comparisons"), (("--min-samples", "5"), "--min-samples"), (("--target", "nan"), "--target"),
     (("--min-samples", "20", "--max-samples", "10"), "--max-samples"), (("--kernel", "none"), "none"),
+    (("--launches", "30", "--max-samples", "20"), "--max-samples"),
     (("--kernel", "ray_cast"), "ray_cast"), (("-o", "/nowhere/self.jsonl"), "/nowhere"), (("--launches", "x"), "--launches"),
 ])
 def test_bad_input(options: tuple[str, ...], field: str) -> None:
