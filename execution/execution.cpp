@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cstdlib>
 #include <set>
 #include <thread>
 #if defined(__SSE2__)
@@ -16,6 +17,7 @@
 
 #include "base/error.h"
 #include "base/suggest.h"
+#include "execution/loop_trace.h"
 
 namespace rasterbench {
 namespace {
@@ -42,7 +44,9 @@ std::string to_string(const ExecutionConfig& config) {
 }
 
 Execution::Execution(const ExecutionConfig& config)
-    : config_(config), tally_(static_cast<std::size_t>(config.threads)) {}
+    : config_(config),
+      stamped_(std::getenv("RASTERBENCH_NO_STAMPS") == nullptr),
+      tally_(static_cast<std::size_t>(config.threads)) {}
 
 void Execution::reset_tally() { std::fill(tally_.begin(), tally_.end(), WorkerTally{}); }
 
@@ -116,7 +120,8 @@ std::unique_ptr<Execution> make_execution(const ExecutionConfig& config) {
   if (config.threads < 1) throw InputError({.field = "threads"}, "must be at least 1");
   if (config.backend == "serial" && config.threads != 1)
     throw InputError({.field = "threads"}, "serial runs on one thread");
-  return schedule.make(config);
+  auto execution = schedule.make(config);
+  return config.trace ? make_traced(std::move(execution)) : std::move(execution);
 }
 
 ScheduleRegistration::ScheduleRegistration(Schedule schedule) { registry().push_back(std::move(schedule)); }

@@ -14,12 +14,16 @@
 
 namespace rasterbench {
 
+class LoopTrace;
+
 /// What to run a loop with. `chunk` empty: the runtime's own default.
 struct ExecutionConfig {
   std::string backend = "serial";
   std::string schedule;  ///< empty for serial
   std::optional<int> chunk;
   int threads = 1;
+  /// Records how Execution::loop() deals its iterations (loop_trace.h); null in every frame that is a sample.
+  LoopTrace* trace = nullptr;
 };
 
 /// "serial", "openmp:static", "openmp:dynamic,16", "tbb:auto".
@@ -31,6 +35,9 @@ using LoopBody = FunctionRef<void(std::int64_t iteration, int worker)>;
 /// What one worker did since the last reset. Padded: each worker writes its own.
 struct alignas(64) WorkerTally {
   std::int64_t iterations = 0;
+  /// Times that the runtime handed it iterations. Where OpenMP does not tell (guided, auto) runs of
+  /// consecutive iterations, of which two that follow each other count once.
+  std::int64_t chunks = 0;
   double busy_seconds = 0;  ///< between its first and last stamp in each loop
   int cpu = -1;             ///< where it ran last
 };
@@ -61,9 +68,13 @@ class Execution {
   /// Seconds of a monotonic clock.
   static double now();
   WorkerTally& tally_of(int worker) { return tally_[static_cast<std::size_t>(worker)]; }
+  /// Whether loops are stamped and counted: always, but where RASTERBENCH_NO_STAMPS is set in the environment
+  /// to measure what that costs. Tallies then stay empty.
+  bool is_stamped() const { return stamped_; }
 
  private:
   ExecutionConfig config_;
+  bool stamped_;
   std::vector<WorkerTally> tally_;
 };
 

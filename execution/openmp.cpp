@@ -2,6 +2,8 @@
 #include <omp.h>
 #include <sched.h>
 
+#include <algorithm>
+
 #include "execution/execution.h"
 
 namespace rasterbench {
@@ -24,18 +26,36 @@ class OpenMp final : public Execution {
 #pragma omp parallel num_threads(threads())
     {
       const int worker = omp_get_thread_num();
-      const double begin = now();
-      std::int64_t iterations = 0;
+      if (is_stamped()) {
+        const double begin = now();
+        std::int64_t iterations = 0, runs = 0, next = -1;
 #pragma omp for schedule(runtime) nowait
-      for (std::int64_t i = 0; i < n; ++i) {
-        body(i, worker);
-        ++iterations;
+        for (std::int64_t i = 0; i < n; ++i) {
+          body(i, worker);
+          ++iterations;
+          runs += i != next;
+          next = i + 1;
+        }
+        WorkerTally& tally = tally_of(worker);
+        tally.busy_seconds += now() - begin;
+        tally.iterations += iterations;
+        tally.chunks += chunks_of(iterations, runs, kind, chunk);
+        tally.cpu = sched_getcpu();
+      } else {
+#pragma omp for schedule(runtime) nowait
+        for (std::int64_t i = 0; i < n; ++i) body(i, worker);
       }
-      WorkerTally& tally = tally_of(worker);
-      tally.busy_seconds += now() - begin;
-      tally.iterations += iterations;
-      tally.cpu = sched_getcpu();
     }
+  }
+
+  /// Only the last chunk of a loop is smaller than the others, so that a thread's iterations tell its chunks
+  /// where these have a size; elsewhere what is seen of them is runs of consecutive iterations.
+  static std::int64_t chunks_of(std::int64_t iterations, std::int64_t runs, omp_sched_t kind, int chunk) {
+    if (kind == omp_sched_dynamic || (kind == omp_sched_static && chunk > 0)) {
+      const std::int64_t size = std::max(chunk, 1);
+      return (iterations + size - 1) / size;
+    }
+    return runs;
   }
 
   omp_sched_t kind_;

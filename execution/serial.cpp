@@ -11,11 +11,13 @@ class Serial final : public Execution {
   using Execution::Execution;
 
   void loop(std::int64_t n, LoopBody body) override {
-    WorkerTally& tally = tally_of(0);
-    const double begin = now();
+    const double begin = is_stamped() ? now() : 0;
     for (std::int64_t i = 0; i < n; ++i) body(i, 0);
+    if (!is_stamped()) return;
+    WorkerTally& tally = tally_of(0);
     tally.busy_seconds += now() - begin;
     tally.iterations += n;
+    tally.chunks += n > 0;
     tally.cpu = sched_getcpu();
   }
 

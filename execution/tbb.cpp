@@ -9,6 +9,7 @@
 #include <algorithm>
 
 #include "execution/execution.h"
+#include "execution/loop_trace.h"
 
 namespace rasterbench {
 namespace {
@@ -27,11 +28,11 @@ class Tbb final : public Execution {
         stamps_(static_cast<std::size_t>(config.threads)) {}
 
   void loop(std::int64_t n, LoopBody body) override {
-    run(n, static_cast<std::size_t>(config().chunk.value_or(1)), body, partitioner_);
+    run(n, static_cast<std::size_t>(config().chunk.value_or(1)), body, partitioner_, config().trace);
   }
   void uniform_loop(std::int64_t n, LoopBody body) override {
     oneapi::tbb::static_partitioner even;
-    run(n, 1, body, even);
+    run(n, 1, body, even, nullptr);
   }
 
  private:
@@ -47,10 +48,15 @@ class Tbb final : public Execution {
   static constexpr double kShortRange = 2e-6;  // seconds
 
   template <class AnyPartitioner>
-  void run(std::int64_t n, std::size_t grain, LoopBody body, AnyPartitioner& partitioner) {
+  void run(std::int64_t n, std::size_t grain, LoopBody body, AnyPartitioner& partitioner, LoopTrace* trace) {
     ++epoch_;
     const auto chunk = [&](const Range& range) {
       const int worker = oneapi::tbb::this_task_arena::current_thread_index();
+      if (trace) trace->begin_chunk(worker);
+      if (!is_stamped()) {
+        for (std::int64_t i = range.begin(); i != range.end(); ++i) body(i, worker);
+        return;
+      }
       Stamp& stamp = stamps_[static_cast<std::size_t>(worker)];
       WorkerTally& tally = tally_of(worker);
       if (stamp.epoch != epoch_) {
@@ -60,6 +66,7 @@ class Tbb final : public Execution {
       }
       for (std::int64_t i = range.begin(); i != range.end(); ++i) body(i, worker);
       tally.iterations += static_cast<std::int64_t>(range.size());
+      ++tally.chunks;
       const bool are_short =
           stamp.last - stamp.first < kShortRange * static_cast<double>(stamp.stamped_ranges);
       if (++stamp.ranges > 16 && are_short && stamp.ranges % 16 != 0) return;
