@@ -13,7 +13,8 @@ struct AllPixels {
                                     .parallel_unit = "a pixel",
                                     .synchronisation = "none: an iteration owns its pixel",
                                     .work = "T P",
-                                    .tests_every_pixel = true};
+                                    .tests_every_pixel = true,
+                                    .unit = LoopUnit::kPixel};
 
   template <NumericMode Mode>
   class Strategy {

@@ -13,7 +13,8 @@ struct BoundingBox {
   static constexpr KernelInfo kInfo{.name = "bounding_box",
                                     .parallel_unit = "a row of one triangle's bounding box",
                                     .synchronisation = "a barrier after each triangle",
-                                    .work = "T + B"};
+                                    .work = "T + B",
+                                    .unit = LoopUnit::kBoxRow};
 
   template <NumericMode Mode>
   class Strategy {

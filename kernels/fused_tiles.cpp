@@ -30,6 +30,9 @@
 namespace rasterbench {
 namespace {
 
+/// log2 of the side of the tiles: that of `tile` rounded down to a power of two from 8 to 128.
+int tile_shift(int tile) { return std::bit_width(static_cast<unsigned>(std::clamp(tile, 8, 128))) - 1; }
+
 constexpr KernelInfo kInfo{
     .name = "fused_tiles",
     .parallel_unit = "a square tile (--tile, 64 pixels; a power of two from 8 to 128)",
@@ -37,14 +40,13 @@ constexpr KernelInfo kInfo{
     .work = "T + tiles of all boxes + B, in vectors",
     .has_tiles = true,
     .techniques = {},  // all
+    .unit = LoopUnit::kTile,
+    .tile_side = [](int tile) { return 1 << tile_shift(tile); },
     .needs = "has its loops in the integers of fixed_8 and the floats of filtered"};
 
 /// Of both modes, whose screen triangles and keys are the same.
 constexpr DepthFunction kDepthFunction = Fixed8::kDepthFunction;
 static_assert(Filtered::kDepthFunction == kDepthFunction && Filtered::kClear == Fixed8::kClear);
-
-/// log2 of the side of the tiles: that of `tile` rounded down to a power of two from 8 to 128.
-int tile_shift(int tile) { return std::bit_width(static_cast<unsigned>(std::clamp(tile, 8, 128))) - 1; }
 
 class FusedTiles final : public Renderer {
  public:

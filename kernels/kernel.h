@@ -14,6 +14,15 @@
 
 namespace rasterbench {
 
+/// What one iteration of the loop under study draws.
+enum class LoopUnit {
+  kTriangle,  ///< a screen triangle: those of the scene first, then further pieces of clipped ones
+  kPixel,     ///< a pixel of the image, row by row
+  kRow,       ///< KernelInfo::rows rows of the image
+  kTile,      ///< a square tile, row of tiles by row of tiles
+  kBoxRow,    ///< a row of one triangle's box, in a loop of its own for each triangle
+};
+
 /// What a kernel declares of itself.
 struct KernelInfo {
   std::string_view name;
@@ -24,6 +33,10 @@ struct KernelInfo {
   bool has_tiles = false;          ///< FrameSettings::tile matters to its speed
   Techniques techniques = kFrameTechniques;  ///< those that it has: the others make no difference to it
   bool hidden = false;                       ///< not listed: a canary
+  LoopUnit unit = LoopUnit::kTriangle;
+  int rows = 1;  ///< that an iteration draws, where the unit is a row
+  /// Side in pixels of the tiles that it makes of FrameSettings::tile; null: that itself.
+  int (*tile_side)(int tile) = nullptr;
   /// What a numeric mode must have to suit, said of modes that do not.
   std::string_view needs = "needs a key of one 64-bit word, which this mode's depth does not fit";
 };

@@ -25,6 +25,7 @@ constexpr KernelInfo kInfo{.name = "ray_cast",
                            .work = "T log T to build, P log T to trace",
                            .has_tiles = true,
                            .techniques = kNoTechniques,
+                           .unit = LoopUnit::kTile,
                            .needs = "casts rays: its arithmetic is Embree's"};
 
 /// Triangles in the order in which Embree gets them. Permuted ones are a copy, for verification only.

@@ -14,7 +14,8 @@ struct RowParallel {
   static constexpr KernelInfo kInfo{.name = "row_parallel",
                                     .parallel_unit = "a row of the image",
                                     .synchronisation = "none: an iteration owns its row",
-                                    .work = "T + heights of all boxes + B"};
+                                    .work = "T + heights of all boxes + B",
+                                    .unit = LoopUnit::kRow};
 
   template <NumericMode Mode>
   class Strategy {

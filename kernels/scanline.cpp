@@ -80,11 +80,15 @@ class EdgeWalk {
   double slope_ = 0;
 };
 
+constexpr int kBandRows = 16;
+
 struct Scanline {
   static constexpr KernelInfo kInfo{.name = "scanline",
                                     .parallel_unit = "a band of 16 rows",
                                     .synchronisation = "none: an iteration owns its rows",
                                     .work = "T + heights of all boxes + covered pixels",
+                                    .unit = LoopUnit::kRow,
+                                    .rows = kBandRows,
                                     .needs = "needs edge tests that split a row once, to search its spans"};
 
   template <MonotoneMode Mode>
@@ -103,8 +107,6 @@ struct Scanline {
     void count(WorkCounters& counters) const { bins_.count(counters); }
 
    private:
-    static constexpr int kBandRows = 16;
-
     static void walk(const typename Mode::Prepared& triangle, const PixelBox& box, Visibility<Mode>& out) {
       EdgeWalk<Mode> edges[3] = {{triangle, 0, box}, {triangle, 1, box}, {triangle, 2, box}};
       for (std::int32_t y = box.y0; y < box.y1; ++y) {

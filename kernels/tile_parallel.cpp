@@ -15,7 +15,8 @@ struct TileParallel {
                                     .parallel_unit = "a square tile (--tile, 64 pixels)",
                                     .synchronisation = "none: an iteration owns its tile",
                                     .work = "T + tiles of all boxes + B",
-                                    .has_tiles = true};
+                                    .has_tiles = true,
+                                    .unit = LoopUnit::kTile};
 
   template <NumericMode Mode>
   class Strategy {

@@ -18,6 +18,7 @@ struct TileSimd {
                                     .synchronisation = "none: an iteration owns its tile",
                                     .work = "T + tiles of all boxes + B, in vectors",
                                     .has_tiles = true,
+                                    .unit = LoopUnit::kTile,
                                     .needs = "has its loops in the integers of fixed_8"};
 
   template <std::same_as<Fixed8> Mode>
