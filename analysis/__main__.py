@@ -1,4 +1,4 @@
-"""Command line: python3 -m analysis report DIR, table DIR, speed DIR, compare DIR_A DIR_B, lint DIR, selftest FILE, adopt DIR, stability FILE."""
+"""Command line: python3 -m analysis report DIR, table DIR, speed DIR, compare DIR_A DIR_B, lint DIR, selftest FILE, adopt DIR, stability FILE, trace FILE."""
 
 from __future__ import annotations
 
@@ -83,6 +83,11 @@ def parser() -> Parser:
                                 description="Writes DIR/figures/*.svg, *.pdf, *.png with their captions, .txt, and DIR/tables/*.csv, *.tex,"
                                             " then prints the times with 95 %% intervals.")
     adopt.add_argument("directory", metavar="DIR", type=Path, help="folder of `rasterbench adopt --out`, with adopt.json")
+    trace = commands.add_parser("trace", help="draw a traced frame: its chunks by thread, the threads' time, the heat map of its costs",
+                                description="Writes FOLDER/gantt, thread_shares and, where the trace has a heat map, cost, each as .png, .svg and"
+                                            " .pdf, their captions.txt, and threads.csv and .tex, then prints the table of the threads.")
+    trace.add_argument("file", metavar="FILE", type=Path, help="a trace of `rasterbench trace` (trace.json)")
+    trace.add_argument("-o", "--out", metavar="FOLDER", type=Path, help="where to write (default: the folder of FILE)")
     report.add_argument("--out", metavar="FILE", type=Path, help="where to write the report (default: DIR/report.html)")
     return main
 
@@ -119,6 +124,14 @@ def main(arguments: list[str] | None = None) -> int:
             from . import adopt
 
             print(adopt.write(options.directory))
+            return 0
+        if options.command == "trace":
+            from . import trace
+
+            traced = trace.read(options.file)
+            written = trace.write(traced, options.out or options.file.parent)
+            print(trace.plain(traced))
+            print(f"written: {', '.join(map(str, written))}")
             return 0
         study = load(options.directory)
         # Imported late: a wrong path should not wait for matplotlib.
