@@ -27,6 +27,7 @@ void add_fuzz_command(CLI::App& app, Outcome& outcome);
 void add_stability_command(CLI::App& app);
 void add_machine_command(CLI::App& app);
 void add_selftest_command(CLI::App& app, Outcome& outcome);
+void add_trace_command(CLI::App& app);
 void add_verify_command(CLI::App& app, Outcome& outcome);
 void add_runner_command(CLI::App& app, Outcome& outcome, const std::vector<std::string>& benchmark_flags);
 
@@ -56,9 +57,12 @@ ExecutionConfig execution_of(const DrawOptions& options);
 /// InputError.
 FrameSettings frame_settings_of(const DrawOptions& options);
 
-/// The point that the options ask for, on a model (which is read where they leave the size to the scene).
-/// Throws InputError, also where the kernel cannot run in the mode.
+/// The point that the options ask for, of a MODEL and, where it is not empty, a SCENE file; width and height
+/// are 0 where they leave the size to the scene. Throws InputError.
 Point point_of(const DrawOptions& options, const std::string& model, const std::string& scene_file);
+
+/// Opens the scene of `point` and gives it the scene's size where it has none.
+Scene open_point_scene(Point& point);
 
 /// Adds the options of DrawOptions that a point of a study has, too: all but tie and cull.
 void add_point_options(CLI::App& command, DrawOptions& options);

@@ -28,13 +28,6 @@ Json first_line(const char* path) {
   return line;
 }
 
-std::string cpu_model() {
-  std::ifstream file("/proc/cpuinfo");
-  for (std::string line; std::getline(file, line);)
-    if (line.starts_with("model name")) return line.substr(line.find(':') + 2);
-  return "unavailable: /proc/cpuinfo names no model";
-}
-
 Json allowed_cpus() {
   cpu_set_t mask;
   CPU_ZERO(&mask);
@@ -92,12 +85,19 @@ Json relevant_environment() {
   Json variables = Json::object();
   for (char** variable = environ; *variable; ++variable) {
     const std::string text(*variable);
-    for (const char* prefix :
-         {"OMP_", "GOMP_", "KMP_", "TBB_", "LD_PRELOAD", "LP_NUM_THREADS", "SLURM_JOB_", "MALLOC_"})
+    for (const char* prefix : {"OMP_", "GOMP_", "KMP_", "TBB_", "LD_PRELOAD", "LP_NUM_THREADS", "SLURM_JOB_",
+                               "MALLOC_", "RASTERBENCH_"})
       if (text.starts_with(prefix))
         variables[text.substr(0, text.find('='))] = text.substr(text.find('=') + 1);
   }
   return variables;
+}
+
+std::string cpu_model() {
+  std::ifstream file("/proc/cpuinfo");
+  for (std::string line; std::getline(file, line);)
+    if (line.starts_with("model name")) return line.substr(line.find(':') + 2);
+  return "unavailable: /proc/cpuinfo names no model";
 }
 
 std::string build_id() { return hash_file("/proc/self/exe"); }

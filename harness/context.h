@@ -15,6 +15,8 @@ Json describe_context(const Study& study, const StudyOptions& options,
 /// `machine`, and the variables of `environment` that are set, of context.json.
 Json describe_machine();
 Json relevant_environment();
+/// The name of the CPU, or "unavailable: REASON".
+std::string cpu_model();
 
 /// Now, ISO 8601, UTC.
 std::string utc_now();

@@ -29,8 +29,10 @@ bool is_study(const std::string& model) { return std::filesystem::path(model).ex
 
 /// The point of `render`'s options, explained in this process and in the environment that it has.
 Json explain_model(const ExplainOptions& options, const DrawOptions& draw_options) {
-  const Point point = point_of(draw_options, options.model, options.scene_file);
-  return explain_point(point, open_scene(options.model, options.scene_file), options.samples);
+  Point point = point_of(draw_options, options.model, options.scene_file);
+  find_schedule(point.execution);
+  const Scene scene = open_point_scene(point);
+  return explain_point(point, scene, options.samples);
 }
 
 const PlannedPoint& only_point(const Study& study, const std::string& pattern) {

@@ -54,6 +54,10 @@ Point point_of(const DrawOptions& options, const std::string& model, const std::
                                                         options.numeric, variant.reason));
   Point point;
   point.scene = parse_scene_reference(model + "@" + scene_file);
+  point.scene.model = model;  // also where it has an @
+  point.scene.parameters = scene_file;
+  point.width = settings.width;
+  point.height = settings.height;
   point.kernel = options.kernel;
   point.numeric = options.numeric;
   point.fill = settings.fill;
@@ -63,15 +67,16 @@ Point point_of(const DrawOptions& options, const std::string& model, const std::
   point.generality = settings.generality;
   point.isa = settings.geometry.isa;
   point.techniques = settings.techniques;
-  find_schedule(point.execution);
-  point.width = settings.width;
-  point.height = settings.height;
-  if (options.size.empty()) {
-    const Scene scene = open_scene(model, scene_file);
+  return point;
+}
+
+Scene open_point_scene(Point& point) {
+  Scene scene = open_scene(point.scene.model, point.scene.parameters);
+  if (point.width == 0) {
     point.width = scene.parameters.width;
     point.height = scene.parameters.height;
   }
-  return point;
+  return scene;
 }
 
 namespace {

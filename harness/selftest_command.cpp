@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "base/error.h"
+#include "execution/execution.h"
 #include "harness/commands.h"
 #include "harness/option_checks.h"
 #include "harness/process.h"
@@ -108,7 +109,9 @@ int run_selftest(const SelftestOptions& options, const DrawOptions& draw_options
     throw InputError({.field = "--max-samples"}, "is less than --launches: some would hold no sample");
   if (options.sampling.max_samples < options.sampling.min_samples)
     throw InputError({.field = "--max-samples"}, "is less than --min-samples");
-  const Point point = point_of(draw_options, options.model, options.scene_file);
+  Point point = point_of(draw_options, options.model, options.scene_file);
+  find_schedule(point.execution);
+  open_point_scene(point);
   catch_interrupts();
   std::ofstream lines;
   const auto check_lines = [&] {
