@@ -26,6 +26,18 @@ Json sizes_json(const std::optional<SizeClasses>& sizes) {
   return json;
 }
 
+Json workers_json(const std::vector<WorkerWork>& workers) {
+  if (workers.empty()) return {};
+  Json json = Json::array();
+  for (const WorkerWork& worker : workers)
+    json.push_back({{"triangles", worker.triangles},
+                    {"bin_entries", worker.bin_entries},
+                    {"fragments_tested", worker.fragments_tested},
+                    {"fragments_passed", worker.fragments_passed},
+                    {"bytes", worker.bytes}});
+  return json;
+}
+
 }  // namespace
 
 CountedFrames count_frames(const Point& point, const Scene& scene) {
@@ -58,6 +70,7 @@ Json work_counters_json(const WorkCounters& c) {
           {"hidden_entries", or_null(c.hidden_entries)},
           {"binned_fragments", or_null(c.binned_fragments)},
           {"merges", or_null(c.merges)},
+          {"per_thread", workers_json(c.per_worker)},
           {"bytes",
            {{"clear", bytes_json(c.clear_bytes)},
             {"geometry", bytes_json(c.geometry_bytes)},

@@ -16,17 +16,22 @@ std::string text_or(const Json& object, const char* key) {
                                                             : std::string();
 }
 
-/// Median over samples of each worker's busy time, with the last sample's counts.
+/// Median over samples of each worker's busy and idle time, with the last sample's counts.
 Json per_thread(const PointState& state) {
   Json threads = Json::array();
   if (state.samples.empty()) return threads;
   const Json& last = state.samples.back().answer.at("per_thread");
   for (std::size_t worker = 0; worker < last.size(); ++worker) {
-    std::vector<double> busy;
-    for (const Sample& sample : state.samples)
-      busy.push_back(sample.answer.at("per_thread").at(worker).at("busy_ms"));
-    threads.push_back({{"busy_ms", median(busy)},
+    const auto median_of = [&](const char* time) {
+      std::vector<double> ms;
+      for (const Sample& sample : state.samples)
+        ms.push_back(sample.answer.at("per_thread").at(worker).at(time));
+      return median(ms);
+    };
+    threads.push_back({{"busy_ms", median_of("busy_ms")},
+                       {"idle_ms", median_of("idle_ms")},
                        {"iterations", last.at(worker).at("iterations")},
+                       {"chunks", last.at(worker).at("chunks")},
                        {"cpu", last.at(worker).at("cpu")}});
   }
   return threads;

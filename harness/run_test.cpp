@@ -33,7 +33,7 @@ class RunTest : public testing::Test {
               {"threads_observed", 1}}}};
   }
   Json sample(int block, double ms) {
-    const Json thread{{"busy_ms", ms / 2}, {"iterations", 4}, {"cpu", 0}};
+    const Json thread{{"busy_ms", ms / 2}, {"idle_ms", ms / 4}, {"iterations", 4}, {"chunks", 2}, {"cpu", 0}};
     return {{"event", "sample"},
             {"id", states_[0].id},
             {"block", block},
@@ -63,6 +63,8 @@ TEST_F(RunTest, RecordHoldsTheSamples) {
   EXPECT_EQ(record.at("frames_per_sample"), 2);
   EXPECT_EQ(record.at("stages_ms").at("geometry").size(), 7u);
   EXPECT_EQ(record.at("per_thread").at(0).at("busy_ms"), 3.5);
+  EXPECT_EQ(record.at("per_thread").at(0).at("idle_ms"), 1.75);
+  EXPECT_EQ(record.at("per_thread").at(0).at("chunks"), 2);
   EXPECT_EQ(record.at("id").get<std::string>().size(), 32u);
 }
 

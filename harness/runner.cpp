@@ -136,7 +136,11 @@ class Runner {
     Json& threads = answer["per_thread"] = Json::array();
     for (const WorkerTally& worker : report->raster_tally)
       threads.push_back(
-          {{"busy_ms", worker.busy_seconds * 1e3}, {"iterations", worker.iterations}, {"cpu", worker.cpu}});
+          {{"busy_ms", worker.busy_seconds * 1e3},
+           {"idle_ms", std::max(0.0, 1e3 * (report->seconds.raster.value_or(0) - worker.busy_seconds))},
+           {"iterations", worker.iterations},
+           {"chunks", worker.chunks},
+           {"cpu", worker.cpu}});
     answer["picture"] = picture_hash(*renderer);
     for (const auto& [counter, value] : reporter.last.counters) answer["counters"][counter] = value.value;
     return answer;

@@ -163,7 +163,10 @@ class Bins {
   /// Calls visit(prepared) for each triangle whose box touches `cell`, in their order.
   template <class Visit>
   void for_each_triangle(std::int64_t cell, Visit visit) const {
-    for (const std::uint32_t index : lists_.entries(cell)) visit(prepared_[index]);
+    const auto entries = lists_.entries(cell);
+    if constexpr (CountingMode<Mode>)
+      calls_of_this_thread->entries += static_cast<std::int64_t>(entries.size());
+    for (const std::uint32_t index : entries) visit(prepared_[index]);
   }
 
  private:

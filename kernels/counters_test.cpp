@@ -83,6 +83,14 @@ TEST(Counters, OfASceneByHand) {
       EXPECT_EQ(c.resolve_bytes, (StageBytes{pixels * 8 + 3 * 36, pixels * 8}));
       const StageBytes least{5 * 40 + 146 * 8, 146 * 8};  // screen triangles and keys
       EXPECT_TRUE(c.raster_bytes->read >= least.read && c.raster_bytes->written >= least.written);
+      ASSERT_EQ(c.per_worker.size(), 1u);
+      const WorkerWork& work = c.per_worker[0];
+      EXPECT_EQ(work.triangles, 4);  // the one beside the image is not set up
+      EXPECT_EQ(work.bin_entries, c.bin_entries.value_or(0));
+      EXPECT_EQ(work.fragments_tested, c.fragments_tested);
+      EXPECT_EQ(work.fragments_passed, 10 + 136 + 3);
+      EXPECT_GE(work.bytes, 4 * 40 + 149 * 8);  // screen triangles and keys
+      EXPECT_EQ(work.bytes == 4 * 40 + 149 * 8, work.bin_entries == 0);
       EXPECT_EQ(c.raster_bytes == least,
                 name == "bounding_box" || name == "triangle_locks" || name == "triangle_atomics");
     }
@@ -110,6 +118,7 @@ TEST(Counters, WhatIsNotCountedIsAbsent) {
   const Scene scene = scene_by_hand();
   const WorkCounters vectors = counted(scene, "tile_simd", "fixed_8").counters;
   EXPECT_EQ(vectors.fragments_tested, std::nullopt);
+  EXPECT_TRUE(vectors.per_worker.empty());
   EXPECT_EQ(vectors.samples_in_boxes, 276);
   const WorkCounters wide = counted(scene, "tile_parallel", "f64").counters;
   EXPECT_EQ(wide.fragments_passed, std::nullopt);
@@ -137,6 +146,14 @@ TEST(Counters, PictureAndCountsAreThoseOfOneThread) {
         EXPECT_EQ(differing_pixels(picture_of(*renderer, small_settings()), expected), 0);
         EXPECT_EQ(c.sizes, serial.sizes);
         EXPECT_EQ(c.fragments_tested, serial.fragments_tested);
+        ASSERT_EQ(c.per_worker.size(), 3u);
+        std::int64_t triangles = 0, passed = 0;
+        for (const WorkerWork& work : c.per_worker) {
+          triangles += work.triangles;
+          passed += work.fragments_passed;
+        }
+        EXPECT_EQ(triangles, serial.per_worker[0].triangles);
+        EXPECT_EQ(passed, serial.fragments_passed);
         EXPECT_EQ(c.edge_tests, serial.edge_tests);
         EXPECT_EQ(c.fragments_passed, serial.fragments_passed);
         EXPECT_EQ(c.covered_pixels, serial.covered_pixels);

@@ -13,6 +13,8 @@ namespace rasterbench {
 
 /// What one worker asked of a mode. Padded: each worker writes its own.
 struct alignas(64) ModeCalls {
+  std::int64_t set_ups = 0;  ///< triangles
+  std::int64_t entries = 0;  ///< triangles of the bins that were gone through
   std::int64_t samples = 0;  ///< whole coverage tests, inside() and covers()
   std::int64_t edges = 0;    ///< tests of single edges
   std::int64_t keys = 0;     ///< fragments that were given a depth and a key
@@ -29,6 +31,11 @@ requires(!RunMode<Mode>)  // runs of pixels would have to be counted as well
   using Prepared = typename Mode::Prepared;
   using Uncounted = Mode;
 
+  template <class... Arguments>
+  static Prepared prepare(const Arguments&... arguments) {
+    if (calls_of_this_thread) ++calls_of_this_thread->set_ups;  // null: asked for outside of a loop
+    return Mode::prepare(arguments...);
+  }
   /// The box before the edges: the whole of it is one test.
   static bool covers(const Prepared& prepared, std::int32_t x, std::int32_t y) {
     ++calls_of_this_thread->samples;
@@ -78,15 +85,8 @@ class CountingExecution final : public Execution {
     calls_of_this_thread = calls_.data();
   }
 
-  ModeCalls total() const {
-    ModeCalls sum;
-    for (const ModeCalls& calls : calls_) {
-      sum.samples += calls.samples;
-      sum.edges += calls.edges;
-      sum.keys += calls.keys;
-    }
-    return sum;
-  }
+  /// Of each worker, since this was made.
+  const std::vector<ModeCalls>& calls() const { return calls_; }
 
  private:
   void run(std::int64_t i, int worker, LoopBody& body) {

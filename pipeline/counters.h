@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 namespace rasterbench {
 
@@ -40,6 +41,17 @@ struct StageBytes {
   bool operator==(const StageBytes&) const = default;
 };
 
+/// What one worker did in the raster stage.
+struct WorkerWork {
+  std::int64_t triangles = 0;         ///< that it set up
+  std::int64_t bin_entries = 0;       ///< that it went through, of kernels that bin
+  std::int64_t fragments_tested = 0;  ///< as WorkCounters::fragments_tested
+  std::int64_t fragments_passed = 0;
+  /// That it read: screen triangles to set up, set-up triangles of bin entries, and a key for each fragment
+  /// that passed.
+  std::int64_t bytes = 0;
+};
+
 /// What a frame did; a field is empty where the kernel has no such thing or does not count it.
 struct WorkCounters {
   std::optional<SizeClasses> sizes;
@@ -58,6 +70,7 @@ struct WorkCounters {
   /// Of these, entries left out because what the tile shows is nearer wherever their triangles reach.
   std::optional<std::int64_t> hidden_entries;
   std::optional<std::int64_t> merges;  ///< keys of private buffers that were compared with the frame's
+  std::vector<WorkerWork> per_worker;  ///< empty where the calls of the mode are not counted
   std::optional<StageBytes> clear_bytes, geometry_bytes, raster_bytes, resolve_bytes;
 };
 

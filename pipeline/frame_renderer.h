@@ -151,7 +151,7 @@ class FrameRenderer final : public Renderer {
       if constexpr (CountingMode<Mode>) {
         CountingExecution counting(*execution_);
         strategy_.draw(staged(), visibility, counting);
-        calls_ = counting.total();
+        calls_ = counting.calls();
       } else {
         strategy_.draw(staged(), visibility, *execution_);
       }
@@ -212,9 +212,21 @@ class FrameRenderer final : public Renderer {
   WorkCounters count_work() const {
     WorkCounters counters;
     if constexpr (CountingMode<Mode>) {
-      counters.fragments_tested = calls_.samples;
-      counters.edge_tests = calls_.edges;
-      counters.fragments_passed = calls_.keys;
+      counters.fragments_tested = counters.edge_tests = counters.fragments_passed = 0;
+      for (const ModeCalls& calls : calls_) {
+        *counters.fragments_tested += calls.samples;
+        *counters.edge_tests += calls.edges;
+        *counters.fragments_passed += calls.keys;
+        const auto of = [](std::int64_t n, std::size_t size) { return n * static_cast<std::int64_t>(size); };
+        counters.per_worker.push_back(
+            {.triangles = calls.set_ups,
+             .bin_entries = calls.entries,
+             .fragments_tested = calls.samples,
+             .fragments_passed = calls.keys,
+             .bytes = of(calls.set_ups, sizeof(screen_.span()[0])) +
+                      of(calls.entries, sizeof(std::uint32_t) + sizeof(typename Mode::Prepared)) +
+                      of(calls.keys, sizeof(typename Mode::Key))});
+      }
     }
     count_boxes(staged(), counters);
     count_visible(ids(), counters);
@@ -240,7 +252,7 @@ class FrameRenderer final : public Renderer {
   DepthMap depth_map_;
   std::uint64_t permutation_seed_;
   bool count_;
-  ModeCalls calls_;  // of the last counted frame
+  std::vector<ModeCalls> calls_;  // of each worker in the last counted frame
   std::unique_ptr<Execution> execution_;
   ScreenTriangles<typename Mode::Real> screen_;
   Buffer<typename Mode::Key> keys_;

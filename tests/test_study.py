@@ -98,7 +98,7 @@ EMBREE = {"version": TEXT, "first_error": (TEXT, NULL), "max_depth_difference": 
 BOUND = {"bounded": bool, "text": TEXT, "source": TEXT}
 WORK = {"triangles": WHOLE, "drawn": WHOLE, "pieces": WHOLE, "rejected": dict, "near_clipped": WHOLE, "guard_clipped": WHOLE,
         "fragments_tested": WHOLE, "fragments_covered": WHOLE, "covered_pixels": WHOLE, "bytes": WHOLE, "counted": (dict, NULL)}
-COUNTED = {"sizes": (dict, NULL), "bytes": dict} | dict.fromkeys(
+COUNTED = {"sizes": (dict, NULL), "bytes": dict, "per_thread": (LIST, NULL)} | dict.fromkeys(
     ["samples_in_boxes", "fragments_tested", "edge_tests", "fragments_passed", "covered_pixels", "visible_triangles", "tiles", "tiles_touched",
      "bin_entries", "hidden_entries", "binned_fragments", "merges"], (WHOLE, NULL))
 EVENTS = ["cycles", "instructions", "branches", "branch_misses", "l1d_read_misses", "llc_misses", "dtlb_read_misses", "task_clock",
@@ -238,7 +238,8 @@ def test_good_points_are_verified(study: Study) -> None:
         assert w["drawn"] + sum(w["rejected"].values()) == w["triangles"]
         assert r["threads_observed"] == r["config"]["threads"] == len(r["per_thread"])
         for worker in r["per_thread"]:
-            assert set(worker) == {"busy_ms", "iterations", "cpu"} and worker["busy_ms"] >= 0 and worker["iterations"] >= 0
+            assert set(worker) == {"busy_ms", "idle_ms", "iterations", "chunks", "cpu"}
+            assert min(worker["busy_ms"], worker["idle_ms"]) >= 0 and 0 <= worker["chunks"] <= worker["iterations"]
 
 
 def test_context_has_the_documented_keys(study: Study) -> None:
