@@ -12,7 +12,7 @@ import jinja2
 import matplotlib
 from markupsafe import Markup
 
-from . import (__version__, checks, figures, findings, ladder, lint, nodes, sidecars, stage_efficiency, statistics, strategy_map, style, tables, text,
+from . import (__version__, checks, figures, findings, ladder, lint, lost_time, nodes, sidecars, stage_efficiency, statistics, strategy_map, style, tables, text,
                trade, trade_tables, trade_text, work, writing)
 from .captions import Caption
 from .comparison import Analysis
@@ -49,7 +49,7 @@ def write(analysis: Analysis, out: Path | None = None) -> Written:
             kind, suffix = ("image/png", "png") if drawing.raster else ("image/svg+xml", "svg")
             uri = data_uri(kind, made[f"{drawing.name}.{suffix}"])
             sections.setdefault(drawing.section, []).append(Embedded(drawing.name, number, uri, drawing.caption))
-    found = [t for module in (nodes, tables, trade_tables, ladder, strategy_map, work, stage_efficiency) for t in module.tables(analysis)]
+    found = [t for module in (nodes, tables, trade_tables, ladder, strategy_map, work, stage_efficiency, lost_time) for t in module.tables(analysis)]
     for table in found:
         if table.section:
             sections.setdefault(table.section, [])  # a section may have tables and no figure

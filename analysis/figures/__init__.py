@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Iterator
 
 from ..comparison import Analysis
-from . import (balance, ladder, numerics, pareto, scaling, scenes, schedules, stage_efficiency, stages, strategy_map, times,
+from . import (balance, ladder, lost_time, numerics, pareto, scaling, scenes, schedules, stage_efficiency, stages, strategy_map, times,
                work)
 from .common import Drawing
 
-MODULES = (scenes, pareto, strategy_map, work, times, ladder, numerics, scaling, schedules, stages, stage_efficiency, balance)
+MODULES = (scenes, pareto, strategy_map, work, times, ladder, numerics, scaling, schedules, stages, stage_efficiency, lost_time, balance)
 
 
 def draw(analysis: Analysis) -> Iterator[Drawing]:

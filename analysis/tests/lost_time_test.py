@@ -1,0 +1,101 @@
+"""The lost-time identity: its terms on times that are known, that it closes, and where there is none."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, Callable
+
+import pytest
+
+from .. import lost_time, report
+from ..figures.lost_time import draw, shares
+from .conftest import analyse
+from .synthetic import plan, write
+
+MakeStudy = Callable[..., Path]
+
+
+def set_times(directory: Path, times: Callable[[dict[str, Any]], tuple[float, list[float]] | None], others: float = 4.0) -> None:
+    """Gives every record `raster` ms of raster stage, `busy` ms of each thread, and `others` ms of other stages."""
+    lines = []
+    for line in (directory / "records.jsonl").read_text().splitlines():
+        value = json.loads(line)
+        found = times(value["config"]) if value["status"] == "ok" else None
+        if found:
+            raster, busy = found
+            n = len(value["samples_ms"])
+            value["samples_ms"] = [raster + others] * n
+            value["stages_ms"] = {"clear": [others / 4] * n, "geometry": [others / 2] * n, "raster": [raster] * n, "resolve": [others / 4] * n}
+            value["per_thread"] = [{"busy_ms": b, "iterations": 10, "cpu": i} for i, b in enumerate(busy)]
+        lines.append(json.dumps(value))
+    (directory / "records.jsonl").write_text("\n".join(lines) + "\n")
+
+
+def known(config: dict[str, Any]) -> tuple[float, list[float]]:
+    """Serial: 20 ms, 18 of them in loops. On one thread handing out takes 1 ms more; on two 12 and 9 ms are busy, of 15."""
+    if config["backend"] == "serial":
+        return 20.0, [18.0]
+    return (21.0, [19.0]) if config["threads"] == 1 else (15.0, [12.0, 9.0])
+
+
+def found(directory: Path, kernel: str = "tile_parallel") -> lost_time.LostTime:
+    analysis = analyse(directory)
+    return next(one for one in lost_time.lost_times(analysis, analysis.groups[0]) if one.record.config.kernel == kernel)
+
+
+def test_terms_of_known_times(study: MakeStudy) -> None:
+    directory = study(kernels=["tile_parallel"])
+    set_times(directory, known)
+    one = found(directory)
+    assert one.over_serial and (one.total, one.useful, one.lost) == (38, 24, 14)
+    assert one.terms == pytest.approx({"inflation": 2, "imbalance": 3, "dispatch": 1, "synchronisation": 2, "serial": 2, "others": 4, "residual": 0})
+
+
+def test_without_a_serial_point_dispatch_is_unknown(study: MakeStudy) -> None:
+    directory = study(kernels=["tile_parallel"])
+    set_times(directory, known)
+    kept = [line for line in (directory / "records.jsonl").read_text().splitlines() if json.loads(line)["config"]["backend"] != "serial"]
+    (directory / "records.jsonl").write_text("\n".join(kept) + "\n")
+    one = found(directory)
+    assert not one.over_serial and (one.total, one.useful) == (38, 25) and one.terms["dispatch"] is None
+    assert one.terms["residual"] == pytest.approx(0) and one.terms["serial"] == 2 and "dispatch" not in shares(one)
+    (table,) = lost_time.tables(analyse(directory))
+    assert "dispatch cannot be told" in table.note and set(table.words["dispatch"]) == {"–"}
+
+
+def test_residual_is_what_the_stages_leave(study: MakeStudy) -> None:
+    directory = study(kernels=["tile_parallel"])
+    set_times(directory, known)
+    lines = []
+    for line in (directory / "records.jsonl").read_text().splitlines():
+        value = json.loads(line)
+        if value["config"]["threads"] == 2:
+            value["samples_ms"] = [20.0] * len(value["samples_ms"])  # 1 ms in no stage
+        lines.append(json.dumps(value))
+    (directory / "records.jsonl").write_text("\n".join(lines) + "\n")
+    one = found(directory)
+    assert one.total == 40 and one.terms["residual"] == pytest.approx(2)
+    assert lost_time.worst_residual([one]) == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize("without", ["one thread", "stamps"])
+def test_none_where_something_is_missing(study: MakeStudy, without: str) -> None:
+    directory = study(kernels=["tile_parallel"], threads=[2] if without == "one thread" else [1, 2])
+    set_times(directory, lambda config: known(config) if without == "one thread" else (known(config)[0], [0.0] * config["threads"]))
+    analysis = analyse(directory)
+    assert lost_time.lost_times(analysis, analysis.groups[0]) == [] and lost_time.tables(analysis) == [] and list(draw(analysis)) == []
+
+
+def test_figure_table_and_report(tmp_path: Path) -> None:
+    directory = write(tmp_path / "study", plan(threads=[1, 2]))
+    analysis = analyse(directory)
+    for group in analysis.groups:
+        for one in lost_time.lost_times(analysis, group):
+            assert sum(term for term in one.terms.values() if term is not None) == pytest.approx(one.lost)
+            assert sum(shares(one).values()) == pytest.approx(100)
+    drawings = list(draw(analysis))
+    assert drawings and all("largest residual" in d.caption.body and "T(1) is" in d.caption.body for d in drawings)
+    written = report.write(analysis)
+    assert f"<h2>{lost_time.SECTION}</h2>" in written.path.read_text()
+    assert (directory / "tables/lost_time.csv").is_file()
