@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cctype>
 #include <chrono>
+#include <cstdlib>
 #include <numeric>
 
 #include "base/error.h"
@@ -98,6 +99,39 @@ TEST_P(EveryConfig, TalliesLoopsOfBothKindsUntilReset) {
   }
   execution->loop(3, nothing);
   EXPECT_EQ(iterations_of(*execution), 3);
+}
+
+TEST_P(EveryConfig, RunsWithoutStampsWhereTheyAreLeftOut) {
+  setenv("RASTERBENCH_NO_STAMPS", "1", 1);
+  const auto bare = make_execution(GetParam());
+  unsetenv("RASTERBENCH_NO_STAMPS");
+  std::atomic<std::int64_t> runs{0};
+  bare->loop(1000, [&](std::int64_t, int) { ++runs; });
+  bare->uniform_loop(1000, [&](std::int64_t, int) { ++runs; });
+  EXPECT_EQ(runs, 2000);
+  for (const WorkerTally& tally : bare->tally()) {
+    EXPECT_EQ(tally.iterations, 0);
+    EXPECT_EQ(tally.chunks, 0);
+    EXPECT_EQ(tally.busy_seconds, 0);
+  }
+}
+
+TEST_P(EveryConfig, TalliesChunks) {
+  const auto execution = make_execution(GetParam());
+  execution->loop(1000, [](std::int64_t, int) {});
+  std::int64_t chunks = 0;
+  for (const WorkerTally& tally : execution->tally()) {
+    EXPECT_LE(tally.chunks, tally.iterations);
+    EXPECT_EQ(tally.chunks > 0, tally.iterations > 0);
+    chunks += tally.chunks;
+  }
+  EXPECT_GE(chunks, 1);
+  const ExecutionConfig& config = GetParam();
+  const bool has_size = config.schedule == "dynamic" || (config.schedule == "static" && config.chunk);
+  if (config.backend == "openmp" && has_size) {
+    const int size = config.chunk.value_or(1);
+    EXPECT_EQ(chunks, (1000 + size - 1) / size);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(All, EveryConfig, testing::ValuesIn(all_configs()), [](const auto& test) {

@@ -18,6 +18,8 @@ class Traced final : public Execution {
 
   void loop(std::int64_t n, LoopBody body) override {
     inner_->reset_tally();
+    if (config().schedule == "guided" && openmp_runtime() == "libgomp")
+      trace_.cut_at(libgomp_guided_begins(n, threads(), config().chunk.value_or(1)));
     trace_.begin_loop(n, threads());
     if (trace_.detail() == LoopTrace::Detail::kLoops)
       inner_->loop(n, body);
@@ -59,6 +61,13 @@ std::unique_ptr<Execution> make_traced(std::unique_ptr<Execution> inner) {
   return std::make_unique<Traced>(std::move(inner));
 }
 
+std::vector<std::int64_t> libgomp_guided_begins(std::int64_t n, int threads, std::int64_t chunk) {
+  std::vector<std::int64_t> begins;
+  for (std::int64_t at = 0; at < n; at += std::max((n - at + threads - 1) / threads, chunk))
+    begins.push_back(at);
+  return begins;
+}
+
 void LoopTrace::clear() {
   loops_.clear();
   for (Worker& worker : workers_) worker.chunks.clear();
@@ -95,7 +104,9 @@ void LoopTrace::add(int worker, std::int64_t iteration, double begin, double end
     return;
   }
   Worker& of = workers_[static_cast<std::size_t>(worker)];
-  if (!of.cut && of.chunks.back().last + 1 == iteration && (multiple_ == 0 || iteration % multiple_ != 0)) {
+  const bool begins = multiple_ > 0 ? iteration % multiple_ == 0
+                                    : std::binary_search(begins_.begin(), begins_.end(), iteration);
+  if (!of.cut && !begins && of.chunks.back().last + 1 == iteration) {
     of.chunks.back().last = iteration;
     of.chunks.back().end = end;
     return;

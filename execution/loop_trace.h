@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "execution/execution.h"
@@ -27,9 +28,11 @@ struct TracedLoop {
 /// not traced.
 ///
 /// A chunk is what the runtime handed out at once, as far as that can be seen. oneTBB passes each range to
-/// the body. OpenMP does not say: a chunk is a run of consecutive iterations of one thread, cut at the
-/// multiples of the chunk where the schedule has one (static with a chunk, dynamic). Under static without a
-/// chunk, guided and auto, two chunks in a row that follow each other are seen as one.
+/// the body. OpenMP does not say: a chunk is a run of consecutive iterations of one thread, cut where the
+/// schedule's rule begins a chunk: at the multiples of its size (dynamic, static with a chunk), and under
+/// guided where libgomp does. Where the rule is not known (guided of another runtime) two chunks in a row
+/// that follow each other are seen as one; static without a chunk, which auto of libgomp is, has one a
+/// thread.
 class LoopTrace {
  public:
   enum class Detail {
@@ -58,8 +61,10 @@ class LoopTrace {
   void add(int worker, std::int64_t iteration, double begin, double end);
   void begin_chunk(int worker);
 
-  /// Where chunks are known to end: at the multiples of this many iterations; 0: nowhere.
+  /// Where chunks are known to begin: at the multiples of this many iterations (0: not known), or at each of
+  /// the iterations in `begins`, which are in order and those of the next loop.
   void cut_at_multiples(std::int64_t chunk) { multiple_ = chunk; }
+  void cut_at(std::vector<std::int64_t> begins) { begins_ = std::move(begins); }
 
   /// Seconds of a monotonic clock.
   static double now();
@@ -74,10 +79,16 @@ class LoopTrace {
 
   Detail detail_;
   std::int64_t multiple_ = 0;
+  std::vector<std::int64_t> begins_;
   std::vector<TracedLoop> loops_;
   std::vector<Worker> workers_;
   std::vector<double> iteration_seconds_;
 };
+
+/// Where the chunks of a loop of `n` iterations begin under libgomp's schedule(guided, chunk): each is the
+/// number of iterations that are left over the threads, rounded up, and not below `chunk`
+/// (gomp_iter_guided_next, libgomp/iter.c of gcc 12). The same whichever thread takes which.
+std::vector<std::int64_t> libgomp_guided_begins(std::int64_t n, int threads, std::int64_t chunk);
 
 /// `inner` with its loops taken down in inner->config().trace. Made by make_execution().
 std::unique_ptr<Execution> make_traced(std::unique_ptr<Execution> inner);

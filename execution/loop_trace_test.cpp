@@ -107,6 +107,27 @@ TEST(LoopTraces, OfStaticWithoutAChunkHaveOneAThread) {
   for (const WorkerTally& tally : execution->tally()) EXPECT_EQ(tally.chunks, 1);
 }
 
+/// Threads take turns as they come, so that a rule that is not the runtime's would be seen: a thread's run
+/// would end within one of its chunks, which makes one more.
+TEST(LoopTraces, CutChunksOfGuidedAsLibgompDoes) {
+  if (openmp_runtime() != "libgomp") GTEST_SKIP() << "the rule is libgomp's, loaded is " << openmp_runtime();
+  EXPECT_EQ(libgomp_guided_begins(100, 2, 1), (std::vector<std::int64_t>{0, 50, 75, 88, 94, 97, 99}));
+  EXPECT_EQ(libgomp_guided_begins(100, 2, 20), (std::vector<std::int64_t>{0, 50, 75, 95}));
+  EXPECT_TRUE(libgomp_guided_begins(0, 2, 1).empty());
+  for (const std::optional<int> chunk : {std::optional<int>(), std::optional<int>(5)})
+    for (int threads = 1; threads <= 4; ++threads) {
+      LoopTrace trace(LoopTrace::Detail::kChunks);
+      const auto execution = make_execution({"openmp", "guided", chunk, threads, &trace});
+      execution->loop(1000, [](std::int64_t i, int) { spin(i % 7 == 0 ? 2e-5 : 2e-6); });
+      std::vector<std::int64_t> begins;
+      for (const auto& of_worker : trace.chunks())
+        for (const TracedChunk& traced : of_worker) begins.push_back(traced.first);
+      std::sort(begins.begin(), begins.end());
+      EXPECT_EQ(begins, libgomp_guided_begins(1000, threads, chunk.value_or(1))) << threads;
+      expect_whole(trace);
+    }
+}
+
 TEST(LoopTraces, HaveTheRangesOfOneTbb) {
   const auto names = backends();
   if (std::count(names.begin(), names.end(), "tbb") == 0) GTEST_SKIP() << "this build has no tbb";

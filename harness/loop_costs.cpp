@@ -16,8 +16,8 @@
 namespace rasterbench {
 namespace {
 
-// Files of at most 50 MB: an event takes about 110 bytes, a cost about 8.
-constexpr std::size_t kMostEvents = 400'000, kMostCosts = 4'000'000;
+// Files of at most 50 MB: an event takes up to 190 bytes, a cost about 8.
+constexpr std::size_t kMostEvents = 250'000, kMostCosts = 4'000'000;
 
 std::unique_ptr<Renderer> traced_renderer(const Point& point, const Scene& scene, ExecutionConfig execution,
                                           LoopTrace* trace) {
@@ -64,11 +64,14 @@ std::string runtime_of(const ExecutionConfig& execution) {
 std::string chunks_found_by(const ExecutionConfig& execution) {
   if (execution.backend == "tbb") return "each is a range that oneTBB handed to the body";
   if (execution.backend == "serial") return "one: all iterations in order";
-  const bool cut = execution.schedule == "dynamic" || (execution.schedule == "static" && execution.chunk);
-  return fmt::format(
-      "stamps around every iteration; a chunk is a run of consecutive iterations of one thread{}",
-      cut ? ", cut at the multiples of the schedule's chunk"
-          : ", so that two chunks in a row that follow each other are one");
+  const std::string found =
+      "stamps around every iteration; a chunk is a run of consecutive iterations of one thread";
+  if (execution.schedule == "dynamic" || (execution.schedule == "static" && execution.chunk))
+    return found + ", cut at the multiples of the schedule's chunk";
+  if (execution.schedule != "guided") return found;
+  return found + (openmp_runtime() == "libgomp"
+                      ? ", cut where libgomp's guided begins a chunk"
+                      : ", so that two chunks in a row that follow each other are one");
 }
 
 struct Joined {

@@ -99,7 +99,7 @@ TEST(TracedFrames, JoinChunksWhereTheFileWouldBeTooLarge) {
   const std::string text = trace_text(point, loop_shape(point), frame, Json());
   EXPECT_LT(text.size(), 50'000'000u);
   const Json json = Json::parse(text);
-  EXPECT_EQ(json.at("metadata").at("chunks_an_event"), 3);
+  EXPECT_EQ(json.at("metadata").at("chunks_an_event"), 4);
   std::int64_t iterations = 0, next = 0;
   for (const Json& event : json.at("traceEvents")) {
     if (event.at("ph") == "M") continue;
