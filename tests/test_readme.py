@@ -71,6 +71,11 @@ def adoption_of_a_small_picture(words: list[str]) -> list[list[str]]:
     return [[*(word if word != "640x360" else "96x54" for word in words), "--repetitions", "2", "--race-seconds", "0.5", "--seconds", "1"]]
 
 
+def trace_of_a_small_picture(words: list[str]) -> list[list[str]]:
+    """A small picture and one frame."""
+    return [[*words, "--size", "96x64", "--frames", "1"]]
+
+
 def report_of_a_small_study(words: list[str]) -> list[list[str]]:
     """The report is drawn of a study of seconds in the folder that the README names."""
     folder = next(word for word in words if word.startswith("results/"))
@@ -127,10 +132,11 @@ TABLE: list[tuple[str, Shorten]] = [
     (PRODUCT + r"rasterbench study .*", planned_only),
     (PRODUCT + r"rasterbench machine( .*)?", machine_of_a_small_point),
     (PRODUCT + r"rasterbench explain .*", explanation_of_a_small_picture),
+    (PRODUCT + r"rasterbench trace .*", trace_of_a_small_picture),
     (PRODUCT + r"rasterbench selftest .*", selftest_of_few),
     (PRODUCT + r"rasterbench adopt .*", adoption_of_a_small_picture),
     (PRODUCT + r"(rasterbench (render|list|scene|verify|advise|extremes|stability|fuzz|--help|--version)|graphics)\b.*", as_it_stands),
-    (r"scripts/python -m analysis (stability|adopt) .*", as_it_stands),
+    (r"scripts/python -m analysis (stability|adopt|trace) .*", as_it_stands),
     (r"scripts/python -m analysis report .*", report_of_a_small_study),
     (r"scripts/python -m analysis compare .*", comparison_of_small_studies),
     (r"scripts/python -m analysis selftest .*", as_it_stands),
