@@ -1,8 +1,9 @@
-"""Command line: python3 -m analysis report DIR, table DIR, speed DIR, compare DIR_A DIR_B, lint DIR, selftest FILE, adopt DIR, stability FILE, trace FILE."""
+"""Command line: python3 -m analysis report DIR, table DIR, speed DIR, compare DIR_A DIR_B, lint DIR, selftest FILE, adopt DIR, stability FILE, trace FILE, whatif FILE."""
 
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from pathlib import Path
 
@@ -22,6 +23,13 @@ def share(words: str) -> float:
     value = float(words)
     if not 0 < value < 1:
         raise argparse.ArgumentTypeError(f"{words} is not between 0 and 1")
+    return value
+
+
+def microseconds(word: str) -> float:
+    value = float(word)
+    if not 0 <= value < math.inf:
+        raise argparse.ArgumentTypeError(f"expected a number that is not below 0, found {word!r}")
     return value
 
 
@@ -88,6 +96,14 @@ def parser() -> Parser:
                                             " .pdf, their captions.txt, and threads.csv and .tex, then prints the table of the threads.")
     trace.add_argument("file", metavar="FILE", type=Path, help="a trace of `rasterbench trace` (trace.json)")
     trace.add_argument("-o", "--out", metavar="FOLDER", type=Path, help="where to write (default: the folder of FILE)")
+    whatif = commands.add_parser("whatif", help="predict schedules and chunks for 1 to 1024 threads from traced costs",
+                                 description="Simulates each schedule and chunk on the costs of a loop's iterations, contention-free, for 1 to"
+                                             " 1024 threads; writes figures, tables and text to FOLDER and prints the answers for 16 and 64 threads.")
+    whatif.add_argument("file", metavar="COSTS", type=Path, help="costs.json, as `rasterbench trace --costs` writes it")
+    whatif.add_argument("--measured", metavar="DIR", type=Path, help="folder of a study to compare the predictions with")
+    whatif.add_argument("--scene", metavar="NAME", help="scene of that study (needed where it has several)")
+    whatif.add_argument("--steal-us", metavar="X", type=microseconds, help="cost of a steal in microseconds (default: that of a chunk)")
+    whatif.add_argument("--out", metavar="FOLDER", type=Path, required=True, help="where to write")
     report.add_argument("--out", metavar="FILE", type=Path, help="where to write the report (default: DIR/report.html)")
     return main
 
@@ -132,6 +148,13 @@ def main(arguments: list[str] | None = None) -> int:
             written = trace.write(traced, options.out or options.file.parent)
             print(trace.plain(traced))
             print(f"written: {', '.join(map(str, written))}")
+            return 0
+        if options.command == "whatif":
+            from . import whatif
+
+            made = whatif.write(options.file, options.out, options.measured, options.scene, options.steal_us)
+            print(made.text)
+            print(f"written: {', '.join(map(str, made.paths))}")
             return 0
         study = load(options.directory)
         # Imported late: a wrong path should not wait for matplotlib.

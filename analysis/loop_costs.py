@@ -1,0 +1,128 @@
+"""Reads the costs of a loop's iterations, as `rasterbench trace --costs` writes them (costs.json)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from . import load
+from .load import InputError, is_whole
+from .statistics import is_number
+
+UNITS = ("row", "tile", "triangle", "pixel")
+MOST_ITERATIONS = 100_000_000  # beyond it the arrays of the simulation do not fit in common memory
+
+
+@dataclass(frozen=True)
+class LoopCosts:
+    """One loop: what each iteration takes on one thread, and what handing out a chunk takes. All times in microseconds."""
+
+    path: Path
+    unit: str
+    kernel: str
+    numeric: str
+    size: tuple[int, int]
+    tile: int | None
+    threads: int  # that dispatch was measured on
+    costs: np.ndarray
+    serial: float | None  # the loop on one thread, without stamps
+    dispatch: dict[str, float]  # "openmp:dynamic,1" -> a chunk's overhead
+    block: int = 1  # iterations that share a cost in the file, and were given equal parts of it
+    raw: dict[str, Any] = field(repr=False, default_factory=dict)
+
+    @property
+    def n(self) -> int:
+        return len(self.costs)
+
+    @property
+    def total(self) -> float:
+        return float(self.costs.sum())
+
+    @property
+    def largest(self) -> float:
+        return float(self.costs.max())
+
+    @property
+    def name(self) -> str:
+        w, h = self.size
+        return f"{self.kernel}, {self.numeric}, {w}x{h}" + (f", tiles of {self.tile}" if self.tile else "")
+
+    def overhead(self, backend: str, schedule: str, chunk: int | None) -> tuple[float, str]:
+        """The measured overhead of a chunk and the name that it was measured under: the schedule's own with this chunk, else with
+        the nearest chunk by ratio, else 0 and "not measured"."""
+        wanted = f"{backend}:{schedule}" + ("" if chunk is None else f",{chunk}")
+        if wanted in self.dispatch:
+            return self.dispatch[wanted], wanted
+        known = {}
+        for name in self.dispatch:
+            kind, _, own = name.partition(",")
+            if kind == f"{backend}:{schedule}" and (not own or own.isdigit()):
+                known[name] = int(own or 0)
+        if chunk is not None and any(known.values()):
+            # A default chunk may be n / threads, whose overhead is another thing: only where nothing else was measured.
+            nearest = min((n for n in known if known[n]), key=lambda n: abs(np.log(chunk / known[n])))
+            return self.dispatch[nearest], nearest
+        if f"{backend}:{schedule}" in known:
+            return self.dispatch[f"{backend}:{schedule}"], f"{backend}:{schedule}"
+        if known:
+            smallest = min(known, key=lambda n: known[n])
+            return self.dispatch[smallest], smallest
+        return 0.0, "not measured"
+
+
+def read(path: Path) -> LoopCosts:
+    value = load.parse(load.read_text(path, "no such file (rasterbench trace --costs writes one)"), path, None)
+
+    def fail(key: str, expected: str) -> InputError:
+        found = repr(value[key]) if key in value else ""
+        return InputError(path, f"expected {expected}, found {found[:60]}" if found else "missing", None, key)
+
+    if value.get("unit") not in UNITS:
+        raise fail("unit", f"one of {', '.join(UNITS)}")
+    for key in ("kernel", "numeric"):
+        if not isinstance(value.get(key), str) or not value[key]:
+            raise fail(key, "text")
+    for key in ("iterations", "threads"):
+        if not is_whole(value.get(key)):
+            raise fail(key, "a whole number above 0")
+    size, tile = value.get("size"), value.get("tile")
+    if not (isinstance(size, list) and len(size) == 2 and all(map(is_whole, size))):
+        raise fail("size", "[width, height]")
+    if tile is not None and not is_whole(tile):
+        raise fail("tile", "a whole number above 0 or null")
+    n, block = value["iterations"], value.get("iterations_a_cost", 1)
+    if n > MOST_ITERATIONS:
+        raise fail("iterations", f"at most {MOST_ITERATIONS}")
+    if not is_whole(block):
+        raise fail("iterations_a_cost", "a whole number above 0")
+    costs = value.get("cost_us")
+    if not isinstance(costs, list) or not all(is_number(c) and c >= 0 for c in costs):
+        raise fail("cost_us", "numbers that are not below 0")
+    if len(costs) != -(-n // block):
+        raise InputError(path, f"holds {len(costs)} costs, expected {-(-n // block)} of {n} iterations", None, "cost_us")
+    if not any(costs):
+        raise InputError(path, "every iteration costs 0", None, "cost_us")
+    serial, dispatch = value.get("serial_us"), value.get("dispatch_us", {})
+    if serial is not None and not (is_number(serial) and serial > 0):
+        raise fail("serial_us", "a number above 0 or null")
+    if not isinstance(dispatch, dict):
+        raise fail("dispatch_us", "an object")
+    for name, cost in dispatch.items():
+        if not (is_number(cost) and cost >= 0):
+            raise InputError(path, f"expected a number that is not below 0, found {cost!r}", None, f"dispatch_us.{name}")
+    return LoopCosts(path, value["unit"], value["kernel"], value["numeric"], tuple(size), tile, value["threads"],
+                     _spread(np.array(costs, dtype=float), n, block), None if serial is None else float(serial),
+                     {name: float(cost) for name, cost in dispatch.items()}, block,
+                     {key: v for key, v in value.items() if key != "cost_us"})
+
+
+def _spread(costs: np.ndarray, n: int, block: int) -> np.ndarray:
+    """One cost an iteration; those of a block are equal, and add up to what the file has."""
+    if block == 1:
+        return costs
+    sizes = np.full(len(costs), block)
+    sizes[-1] = n - block * (len(costs) - 1)
+    return np.repeat(costs / sizes, sizes)

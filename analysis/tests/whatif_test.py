@@ -1,0 +1,133 @@
+"""What-if: the answers of known loops, fits that can and cannot be identified, bad input in one line, the files of the command."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+
+import matplotlib.image
+import numpy as np
+import pandas as pd
+import pytest
+
+from .. import __main__ as program
+from .. import scaling_laws, whatif
+from ..loop_costs import read
+from . import loops, synthetic
+
+
+def model(tmp_path, costs, **changes):
+    return whatif.Model(read(loops.write(tmp_path / "costs.json", costs, **changes)))
+
+
+def rule(schedule, backend="openmp", runtime=""):
+    return whatif.Rule(backend, schedule, runtime)
+
+
+def test_an_even_loop_without_dispatch_scales_with_its_threads(tmp_path):
+    m = model(tmp_path, np.full(1024, 10.0), dispatch_us={})
+    for threads in (1, 16, 1024):
+        assert m.predict(rule("static"), None, threads).speedup == pytest.approx(threads)
+
+
+def test_one_large_iteration_bounds_every_schedule(tmp_path):
+    m = model(tmp_path, [1000.0, *[1.0] * 999])
+    best = m.best(64)[0]
+    assert best.speedup <= best.iteration_bound == pytest.approx(1.999)
+    assert all(p.speedup <= min(p.threads, p.chunk_bound) * (1 + 1e-3) for p in m.at(64))
+
+
+def test_a_hot_end_is_no_case_for_static(tmp_path):
+    m = model(tmp_path, np.r_[np.ones(960), np.full(64, 50.0)], dispatch_us={})
+    assert rule("static") not in {p.rule for p in m.best(16) if p.chunk is None}
+    assert m.predict(rule("static"), None, 16).efficiency < 0.5 < m.predict(rule("dynamic"), 1, 16).efficiency
+
+
+def test_the_overhead_of_the_nearest_chunk_stands_for_one_that_was_not_measured(tmp_path):
+    costs = read(loops.write(tmp_path / "costs.json", [1.0]))
+    assert costs.overhead("openmp", "dynamic", 1) == (0.3, "openmp:dynamic,1")
+    assert costs.overhead("openmp", "dynamic", 2) == (0.3, "openmp:dynamic,1")
+    assert costs.overhead("openmp", "dynamic", 8) == (0.5, "openmp:dynamic,16")
+    assert costs.overhead("openmp", "guided", 8) == (0.4, "openmp:guided")
+    assert costs.overhead("tbb", "affinity", 1) == (0.0, "not measured")
+
+
+def test_costs_of_blocks_are_spread_over_their_iterations(tmp_path):
+    costs = read(loops.write(tmp_path / "costs.json", [4.0, 6.0, 1.0], iterations=10, iterations_a_cost=4))
+    assert costs.n == 10 and costs.total == pytest.approx(11.0)
+    assert costs.costs.tolist() == pytest.approx([1.0] * 4 + [1.5] * 4 + [0.5] * 2)
+
+
+def test_laws_are_found_again_and_only_where_they_can_be():
+    threads = [1, 2, 4, 8, 16]
+    times = [10 * (0.1 + 0.9 / p) for p in threads]
+    amdahl = scaling_laws.fit(scaling_laws.AMDAHL, threads, times)
+    assert amdahl.estimates["serial share"].value == pytest.approx(0.1)
+    usl = scaling_laws.fit(scaling_laws.USL, threads, [10 * (1 + 0.05 * (p - 1) + 0.01 * p * (p - 1)) / p for p in threads])
+    assert usl.estimates["contention"].value == pytest.approx(0.05)
+    assert usl.estimates["coherency"].value == pytest.approx(0.01)
+    for law, enough in ((scaling_laws.AMDAHL, 4), (scaling_laws.USL, 5)):
+        assert scaling_laws.fit(law, threads[:enough], times[:enough]).estimates
+        refused = scaling_laws.fit(law, threads[:enough - 1], times[:enough - 1])
+        assert not refused.estimates and "not identifiable" in refused.reason
+
+
+def test_the_interval_of_a_law_holds_its_parameter():
+    rng = np.random.default_rng(5)
+    threads, inside = np.array([1, 2, 4, 8, 16]), 0
+    for _ in range(200):
+        times = 10 * (0.1 + 0.9 / threads) * np.exp(rng.normal(0, 0.01, len(threads)))
+        e = scaling_laws.fit(scaling_laws.AMDAHL, threads.tolist(), times.tolist()).estimates["serial share"]
+        inside += e.low <= 0.1 <= e.high
+    assert 180 <= inside <= 199
+
+
+@pytest.mark.parametrize("changes, field", [
+    ({"unit": "furlong"}, "unit"), ({"kernel": ...}, "kernel"), ({"iterations": 0}, "iterations"), ({"iterations": 4}, "cost_us"),
+    ({"cost_us": [1, -1, 1]}, "cost_us"), ({"cost_us": [0, 0, 0]}, "cost_us"), ({"size": [1]}, "size"), ({"tile": 0}, "tile"),
+    ({"serial_us": "long"}, "serial_us"), ({"dispatch_us": {"openmp:static": -1}}, "dispatch_us.openmp:static"), ({"threads": True}, "threads")])
+def test_bad_fields_are_named(tmp_path, capsys, changes, field):
+    path = loops.write(tmp_path / "costs.json", [1.0, 2.0, 3.0], **changes)
+    assert program.main(["whatif", str(path), "--out", str(tmp_path / "out")]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1 and f"costs.json: {field}:" in err
+    assert not (tmp_path / "out").exists()
+
+
+def plan(**changes):
+    return synthetic.plan(**(dict(kernels=["row_parallel"], scenes={"teapot": (6320, 45.0, [1920, 1080])}, untimed=False,
+                                  threads=[1, 2, 4, 8]) | changes))
+
+
+def test_command_compares_with_a_study(tmp_path, capsys):
+    costs = loops.write(tmp_path / "costs.json", loops.heavy(1080))
+    study = synthetic.write(tmp_path / "study", plan())
+    assert program.main(["whatif", str(costs), "--measured", str(study), "--out", str(tmp_path / "out")]) == 0
+    out, err = capsys.readouterr()
+    assert err == "" and "64 threads:" in out and "contention-free" in out and "not identifiable: 4 thread counts, 5 needed" in out
+    folder = tmp_path / "out"
+    table = pd.read_csv(folder / "whatif_measured.csv")
+    assert set(table.threads) == {1, 2, 4, 8}
+    assert table.error.to_list() == pytest.approx((table.predicted_ms / table.measured_ms - 1).to_list())
+    # The synthetic serial share is 1 - 0.95.
+    fits = pd.read_csv(folder / "whatif_fits.csv").set_index(["schedule", "law", "parameter"])
+    assert fits.loc[("openmp dynamic,16", "Amdahl", "serial share"), "value"] == pytest.approx(0.05, abs=0.03)
+    for figure in ("whatif_curves", "whatif_schedules"):
+        ElementTree.parse(folder / f"{figure}.svg")
+        assert "contention-free" in (folder / f"{figure}.txt").read_text()
+        image = matplotlib.image.imread(folder / f"{figure}.png")
+        for edge in (image[:2], image[-2:], image[:, :2], image[:, -2:]):
+            assert edge[..., :3].min() > 0.99
+    assert "Machine: Example CPU 9000" in (folder / "whatif_curves.txt").read_text()
+
+
+def test_a_study_of_something_else_or_of_several_scenes_is_refused(tmp_path, capsys):
+    costs = loops.write(tmp_path / "costs.json", loops.heavy(100), kernel="tile_parallel")
+    study = synthetic.write(tmp_path / "study", plan())
+    assert program.main(["whatif", str(costs), "--measured", str(study), "--out", str(tmp_path / "out")]) == 2
+    assert "holds no timed point of tile_parallel" in capsys.readouterr().err
+    two = synthetic.write(tmp_path / "two", plan(scenes={name: (6320, 45.0, [1920, 1080]) for name in ("teapot", "city")}))
+    costs = loops.write(tmp_path / "costs.json", loops.heavy(100))
+    arguments = ["whatif", str(costs), "--measured", str(two), "--out", str(tmp_path / "out")]
+    assert program.main(arguments) == 2
+    assert "name one with --scene" in capsys.readouterr().err
+    assert program.main([*arguments, "--scene", "city"]) == 0
