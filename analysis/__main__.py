@@ -102,6 +102,8 @@ def parser() -> Parser:
     whatif.add_argument("file", metavar="COSTS", type=Path, help="costs.json, as `rasterbench trace --costs` writes it")
     whatif.add_argument("--measured", metavar="DIR", type=Path, help="folder of a study to compare the predictions with")
     whatif.add_argument("--scene", metavar="NAME", help="scene of that study (needed where it has several)")
+    whatif.add_argument("--replay", metavar="FILE", type=Path, action="append", default=[],
+                        help="output of `rasterbench replay --json`, to state the error of the rules; may be repeated")
     whatif.add_argument("--steal-us", metavar="X", type=microseconds, help="cost of a steal in microseconds (default: that of a chunk)")
     whatif.add_argument("--out", metavar="FOLDER", type=Path, required=True, help="where to write")
     report.add_argument("--out", metavar="FILE", type=Path, help="where to write the report (default: DIR/report.html)")
@@ -152,7 +154,7 @@ def main(arguments: list[str] | None = None) -> int:
         if options.command == "whatif":
             from . import whatif
 
-            made = whatif.write(options.file, options.out, options.measured, options.scene, options.steal_us)
+            made = whatif.write(options.file, options.out, options.measured, options.scene, options.steal_us, options.replay)
             print(made.text)
             print(f"written: {', '.join(map(str, made.paths))}")
             return 0

@@ -14,7 +14,7 @@ import matplotlib
 import numpy as np
 import pandas as pd
 
-from . import load, scaling_laws, schedule_model, statistics, style, text, work_stealing, writing
+from . import load, replays, scaling_laws, schedule_model, statistics, style, text, work_stealing, writing
 from .comparison import Analysis
 from .load import InputError, Record, Study
 from .loop_costs import LoopCosts, read
@@ -311,20 +311,20 @@ class Written:
     text: str
 
 
-def write(path: Path, folder: Path, study: Path | None = None, scene: str | None = None, steal: float | None = None) -> Written:
+def write(path: Path, folder: Path, study: Path | None = None, scene: str | None = None, steal: float | None = None,
+          replayed: Sequence[Path] = ()) -> Written:
     """Figures, tables and text of a what-if; nothing is written where the input is bad."""
     from .figures import whatif as drawing
 
     model = Model(read(path), steal)
     found = None if study is None else measured(model, study, scene)
     made = [answers_table(model), predictions_table(model)] + ([measured_table(found), fits_table(found)] if found and found.points else [])
+    made += [replays.table([replays.read(file) for file in replayed])] if replayed else []
     files: dict[str, str | bytes] = {}
-    captions = []
     with matplotlib.rc_context(style.RC):
         for drawn in (drawing.curves(model, found), drawing.heat_map(model)):
             files |= {f"{drawn.name}.{kind}": content for kind, content in style.outputs(drawn.figure).items()}
             files[f"{drawn.name}.txt"] = f"{drawn.caption.plain}\n{drawn.caption.reading}\n"
-            captions.append(drawn.name)
     for table in made:
         files |= {f"{table.name}.csv": table.csv(), f"{table.name}.tex": table.tex()}
     lines = findings(model, found)

@@ -28,6 +28,7 @@ void add_stability_command(CLI::App& app);
 void add_machine_command(CLI::App& app);
 void add_selftest_command(CLI::App& app, Outcome& outcome);
 void add_trace_command(CLI::App& app);
+void add_replay_command(CLI::App& app, Outcome& outcome);
 void add_verify_command(CLI::App& app, Outcome& outcome);
 void add_runner_command(CLI::App& app, Outcome& outcome, const std::vector<std::string>& benchmark_flags);
 

@@ -45,6 +45,7 @@ int run(int argc, char** argv) {
   add_machine_command(app);
   add_selftest_command(app, outcome);
   add_trace_command(app);
+  add_replay_command(app, outcome);
   add_runner_command(app, outcome, benchmark_flags);
   for (CLI::App* command : app.get_subcommands({})) command->set_version_flag("--version", version);
   if (!benchmark_flags.empty() && argc > 1 && argv[1] != std::string_view("study") &&

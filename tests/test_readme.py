@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shlex
@@ -115,6 +116,18 @@ def states_of_a_planned_study(words: list[str]) -> list[list[str]]:
     return [["mkdir", "-p", f"{folder}/slurm"], ["bash", "-c", plan], ["bash", "-c", f"{shlex.join(words)} || [ $? = 3 ]"]]
 
 
+def of_small_costs(words: list[str]) -> list[list[str]]:
+    """A few invented costs; without a study, which whatif_test.py compares with. Short sleeps."""
+    costs = {"unit": "row", "iterations": 40, "size": [64, 48], "kernel": "row_parallel", "numeric": "f32", "threads": 2,
+             "cost_us": [1.0 + i % 7 for i in range(40)]}
+    if "--measured" in words:
+        k = words.index("--measured")
+        words = words[:k] + words[k + 2:]
+    else:
+        words = [*words, "--seconds", "0.05"]
+    return [["bash", "-c", f"echo {shlex.quote(json.dumps(costs))} > costs.json"], words]
+
+
 def presets_that_there_are(words: list[str]) -> list[list[str]]:
     """Configuring and building again is the tests' own prerequisite."""
     kind = "build" if "--build" in words else "configure"
@@ -135,6 +148,7 @@ TABLE: list[tuple[str, Shorten]] = [
     (PRODUCT + r"rasterbench trace .*", trace_of_a_small_picture),
     (PRODUCT + r"rasterbench selftest .*", selftest_of_few),
     (PRODUCT + r"rasterbench adopt .*", adoption_of_a_small_picture),
+    (PRODUCT + r"rasterbench replay costs.json .*|scripts/python -m analysis whatif costs.json .*", of_small_costs),
     (PRODUCT + r"(rasterbench (render|list|scene|verify|advise|extremes|stability|fuzz|--help|--version)|graphics)\b.*", as_it_stands),
     (r"scripts/python -m analysis (stability|adopt|trace) .*", as_it_stands),
     (r"scripts/python -m analysis report .*", report_of_a_small_study),

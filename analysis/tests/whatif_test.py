@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import xml.etree.ElementTree as ElementTree
 
 import matplotlib.image
@@ -131,3 +132,28 @@ def test_a_study_of_something_else_or_of_several_scenes_is_refused(tmp_path, cap
     assert program.main(arguments) == 2
     assert "name one with --scene" in capsys.readouterr().err
     assert program.main([*arguments, "--scene", "city"]) == 0
+
+
+def replay(tmp_path, **changes):
+    """As `rasterbench replay --json` writes it: two threads, dynamic,1, each iteration 1 ms, measured 5 % late."""
+    value = {"execution": "openmp:dynamic,1", "runtime": "libgomp", "threads": 2, "iterations": 4,
+             "repetitions": [{"measured_ms": 2.1, "slept_ms": [1.0] * 4, "workers": [0, 1, 0, 1]}]} | changes
+    path = tmp_path / "replay.json"
+    path.write_text(json.dumps(value))
+    return path
+
+
+def test_the_error_of_a_replay_is_stated(tmp_path, capsys):
+    costs = loops.write(tmp_path / "costs.json", loops.heavy(100))
+    assert program.main(["whatif", str(costs), "--replay", str(replay(tmp_path)), "--out", str(tmp_path / "out")]) == 0
+    assert "Sleep replay" in capsys.readouterr().out
+    assert pd.read_csv(tmp_path / "out/whatif_replay.csv").error.to_list() == pytest.approx([2.0 / 2.1 - 1])
+
+
+@pytest.mark.parametrize("changes, field", [({"execution": "openmp:auto"}, "execution"), ({"runtime": "other"}, "runtime"), ({"threads": 0}, "threads"),
+                                            ({"iterations": 3}, "repetitions"), ({"repetitions": []}, "repetitions")])
+def test_bad_replays_are_refused(tmp_path, capsys, changes, field):
+    costs = loops.write(tmp_path / "costs.json", loops.heavy(100))
+    assert program.main(["whatif", str(costs), "--replay", str(replay(tmp_path, **changes)), "--out", str(tmp_path / "out")]) == 2
+    assert f"replay.json: {field}:" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
