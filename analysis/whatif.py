@@ -295,7 +295,7 @@ def cautions(model: Model) -> list[str]:
     if costs.block > 1:
         lines.append(f"Each {costs.block} consecutive iterations share one traced cost: smaller chunks look more even than they are.")
     if model.steal is None:
-        lines.append("A steal is taken to cost what a chunk does (--steal changes it).")
+        lines.append("A steal is taken to cost what a chunk does (--steal-us changes it).")
     return lines
 
 
