@@ -330,5 +330,5 @@ def write(path: Path, folder: Path, study: Path | None = None, scene: str | None
     lines = findings(model, found)
     said = "\n".join([*lines, "", *(f"{table.title}. {table.note}\n{plain(table)}\n" for table in made)])
     files["whatif.txt"] = said
-    writing.write_folder(folder, files)
+    writing.write_folder(folder, files, "whatif", [path, *replayed, *([study / "records.jsonl"] if study else [])])
     return Written([folder / name for name in files], said)
