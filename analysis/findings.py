@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Callable, Iterator
 
 from . import nodes, statistics, text, trade_text
-from .comparison import Analysis, Group, Panel
+from .comparison import EXTRA_AXES, Analysis, Group, Panel
 from .figures.balance import imbalance
 from .figures.scaling import curves
 from .load import Record
@@ -61,6 +61,11 @@ def fastest(analysis: Analysis) -> Iterator[Finding]:
             tail = f"; {text.count(len(own), 'other point')} of {best.config.kernel} cannot be told apart from it" if own else ""
             yield Finding("fastest", 4 + min(1.5, cautious(ratio)), f"On {where(group)} {analysis.label(best)} is the fastest kernel:"
                           f" {analysis.time(best)}, {by(ratio)} faster than the runner-up {analysis.label(runner)}{tail}.")
+        elif 1 < best.samples.launch_count < statistics.MIN_LAUNCHES and all(group.comparisons[r.id].ratio.excludes_one for r in equal):
+            # A test over two or three launches finds nothing, however far apart they are.
+            yield Finding("fastest", 2.5, f"On {where(group)} {analysis.label(best)} ({analysis.time(best)}) is"
+                          f" {by(group.comparisons[runner.id].ratio)} faster than the runner-up {analysis.label(runner)} in these"
+                          f" {best.samples.launch_count} launches, too few to say so of others ({statistics.MIN_LAUNCHES} would do).")
         else:
             equal = sorted(equal, key=lambda r: analysis.estimates[r.id].value)
             names = text.listing([f"{analysis.label(r)} ({analysis.time(r)})" for r in equal], 2)
@@ -163,11 +168,11 @@ def schedules(analysis: Analysis) -> Iterator[Finding]:
     cases: list[tuple[Panel, str, list[Record]]] = []
     for panel in analysis.panels:
         timed = [r for r in panel.cells.values() if r.ok]
-        # Within one backend: OpenMP against oneTBB is a finding of its own.
-        for backend in dict.fromkeys(r.config.backend for r in timed):
-            mine = [r for r in timed if r.config.backend == backend]
-            if len(mine) > 1:
-                cases.append((panel, backend, mine))
+        # Within one backend: OpenMP against oneTBB is a finding of its own. Instruction sets and techniques are no schedules.
+        alike: dict[tuple, list[Record]] = {}
+        for record in timed:
+            alike.setdefault((record.config.backend, *(getattr(record.config, axis) for axis in EXTRA_AXES)), []).append(record)
+        cases += [(panel, records[0].config.backend, records) for records in alike.values() if len(records) > 1]
     for panel, backend, timed in cases:
         group, threads = panel.group, text.count(panel.threads, "thread")
         index, comparisons = statistics.compare_with_best([r.samples for r in timed], analysis.study.target, len(cases))

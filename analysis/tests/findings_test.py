@@ -57,6 +57,23 @@ def test_few_samples_claim_nothing(study):
     assert len(findings.top(analysis)) == 3
 
 
+def test_two_launches_are_too_few_and_say_so(study):
+    said = [f.text for f in findings.candidates(analyse(study(launches=2, untimed=False))) if f.kind == "fastest"]
+    assert said and all("in these 2 launches, too few to say so of others" in words for words in said)
+
+
+def test_instruction_sets_are_no_schedules(study):
+    def other_isa(records):
+        for entry in records:
+            if entry["config"]["schedule"] == "dynamic":
+                entry["config"]["isa"] = "avx512"
+
+    schedules = [("openmp", "static", None), ("openmp", "dynamic", 1)]
+    kinds = {edit: {f.kind for f in findings.candidates(analyse(study(schedules=schedules, edit=edit)))} & {"schedule", "no schedule effect"}
+             for edit in (None, other_isa)}
+    assert kinds[None] and not kinds[other_isa]
+
+
 def test_failed_points_are_a_finding(study):
     def fail(records):
         for entry in records[::2]:
