@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Collection
 
 from . import nodes, statistics, text
 from .load import Config, Record, Study
@@ -178,6 +179,11 @@ class Analysis:
             group.best = timed[best]
             group.comparisons = {record.id: c for record, c in zip(timed, comparisons)}
         return group
+
+    def without(self, group: Group, kernels: Collection[str], families: int) -> Group:
+        """The group without some kernels, its points compared afresh among themselves; families: as many groups are shown so."""
+        left = Group(group.key, group.title, [r for r in group.records if r.config.kernel not in kernels], slug=group.slug)
+        return self._compared(left, families)
 
     def group_of(self, record: Record) -> Group:
         return next(group for group in self.groups if any(r is record for r in (*group.records, *group.peers)))

@@ -91,19 +91,21 @@ def _first_of_each(records: list[Record]) -> list[Record]:
 
 
 def _ladders(records: list[Record]) -> list[list[Step]]:
+    if not any(_rungs([r for r in records if r.config.kernel == kernel]) > 1 for kernel in {r.config.kernel for r in records}):
+        return []  # kernels side by side, each as it is: nothing is climbed
     across = _across(records)
-    result = [across] if _rungs(across) > 1 else []
+    result = [across] if _rungs([step.record for step in across]) > 1 else []
     shown = {step.record.id for ladder in result for step in ladder}
     for kernel in dict.fromkeys(record.config.kernel for record in records):
         mine = [record for record in records if record.config.kernel == kernel]
         own = _climb(sorted(mine, key=lambda r: Rung.of(r.config).height))
-        if _rungs(own) > 1 and any(step.record.id not in shown for step in own):
+        if _rungs([step.record for step in own]) > 1 and any(step.record.id not in shown for step in own):
             result.append(own)
     return result
 
 
-def _rungs(steps: list[Step]) -> int:
-    return len({Rung.of(step.record.config) for step in steps})
+def _rungs(records: list[Record]) -> int:
+    return len({Rung.of(record.config) for record in records})
 
 
 def _across(records: list[Record]) -> list[Step]:

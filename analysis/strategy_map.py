@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from . import text
 from .comparison import GROUP_AXES, Analysis, Group
 from .load import Record
 from .statistics import Estimate, is_number
@@ -46,11 +47,21 @@ class Map:
     rows: list[tuple[float, float]]
     columns: list[tuple[int, int]]
     cells: dict[tuple[int, int], Cell]
+    without: tuple[str, ...] = ()  # kernels that were left out because they lead everywhere
+
+    @property
+    def heading(self) -> str:
+        return "The fastest strategy" + (f" but for {text.listing(list(self.without), 4)}" if self.without else "")
 
     @property
     def kernels(self) -> list[str]:
         """In the order of the study: each has one colour, won or not."""
-        return list(dict.fromkeys(r.config.kernel for cell in self.cells.values() for r in cell.group.records))
+        return list(dict.fromkeys(r.config.kernel for cell in self.cells.values() for r in cell.group.records
+                                  if r.config.kernel not in self.without))
+
+    @property
+    def leaders(self) -> set[str]:
+        return {cell.best.config.kernel for cell in self.cells.values() if cell.best is not None}
 
 
 def pixels_per_triangle(record: Record) -> float | None:
@@ -60,17 +71,19 @@ def pixels_per_triangle(record: Record) -> float | None:
 
 
 def maps(analysis: Analysis) -> list[Map]:
-    """One of each generator whose scenes vary in triangles and in their size, by everything else that is equal."""
-    found: dict[tuple, list[Cell]] = {}
+    """One of each generator whose scenes vary in triangles and in their size, by everything else that is equal. A map that one
+    strategy leads from end to end is followed by the map of the others, so that theirs shows, too."""
+    found: dict[tuple, list[tuple[Group, Record]]] = {}
     for group in analysis.groups:
         counted = next((r for r in group.records if triangles(r) and pixels_per_triangle(r)), None)
         if counted is None or (own := family(analysis, counted)) is None:
             continue
         config = counted.config
         rules = tuple(getattr(config, axis) for axis in GROUP_AXES if axis not in ("scene", "scene_hash"))
-        found.setdefault((own[0], *rules), []).append(_cell(analysis, group, counted))
-    result = []
-    for key, cells in found.items():
+        found.setdefault((own[0], *rules), []).append((group, counted))
+    result: list[Map] = []
+    for key, pictures in found.items():
+        cells = [_cell(analysis, group, triangles(counted), pixels_per_triangle(counted)) for group, counted in pictures]
         rows = clusters([cell.pixels_per_triangle for cell in cells])
         across = clusters([cell.triangles for cell in cells])
         placed = {(_index(rows, c.pixels_per_triangle), _index(across, c.triangles)): c for c in cells}
@@ -80,11 +93,19 @@ def maps(analysis: Analysis) -> list[Map]:
         config = cells[0].group.records[0].config
         title = f"{key[0]} {config.size[0]}x{config.size[1]} {config.numeric} {config.fill}"
         slug = "".join(c.lower() if c.isalnum() and c.isascii() else "_" for c in title)
-        result.append(Map(title, slug + (f"_{len(result) + 1}" if result else ""), rows, across, placed))
+        slug += f"_{len(result) + 1}" if result else ""
+        drawn = Map(title, slug, rows, across, placed)
+        result.append(drawn)
+        while len(drawn.leaders) == 1 and len(drawn.kernels) > 2:
+            without = (*drawn.without, *drawn.leaders)
+            placed = {place: _cell(analysis, analysis.without(cell.group, without, len(pictures)), cell.triangles, cell.pixels_per_triangle)
+                      for place, cell in placed.items()}
+            drawn = Map(title, f"{slug}_without_{len(without)}", rows, across, placed, without)
+            result.append(drawn)
     return result
 
 
-def _cell(analysis: Analysis, group: Group, counted: Record) -> Cell:
+def _cell(analysis: Analysis, group: Group, count: int, size: float) -> Cell:
     best = group.best
     rivals: dict[str, Record] = {}
     for record in group.timed:
@@ -96,7 +117,7 @@ def _cell(analysis: Analysis, group: Group, counted: Record) -> Cell:
     second = nearest[0] if nearest else None
     tied = tuple(r.config.kernel for r in nearest if group.comparisons[r.id].verdict != "slower")
     lead = None if second is None else group.comparisons[second.id].ratio
-    return Cell(group, triangles(counted), pixels_per_triangle(counted), best, second, lead, tied)
+    return Cell(group, count, size, best, second, lead, tied)
 
 
 def clusters(values: list) -> list[tuple]:
@@ -144,7 +165,7 @@ def _table(analysis: Analysis, found: Map) -> Table:
         said |= {"fastest": cell.best.config.kernel, "ms": times(best), "second": cell.second.config.kernel,
                  "its time / the fastest": times(cell.lead), "not told apart": ", ".join(cell.tied)}
         words.append(said)
-    return Table(f"map_{found.slug}", f"The fastest strategy by triangles and their size, {found.title}",
+    return Table(f"map_{found.slug}", f"{found.heading} by triangles and their size, {found.title}",
                  "Pixels per triangle: fragments covered per triangle drawn, as counted. Not told apart: kernels whose difference from the"
                  " fastest the rank test (corrected for all pictures) and the paired interval do not both support.",
                  pd.DataFrame(numbers), pd.DataFrame(words).fillna(""), section=SECTION, folded=len(words) > 12)

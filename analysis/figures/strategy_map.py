@@ -62,7 +62,7 @@ def _draw(analysis: Analysis, found: Map) -> Drawing:
     axes.set_xlabel("triangles")
     axes.set_ylabel("pixels per triangle, as counted")
     threads = sorted({r.config.threads for r in shown})
-    style.title(figure, f"The fastest strategy, {found.title}, {text.count(threads[-1], 'thread')}" if threads else found.title)
+    style.title(figure, f"{found.heading}, {found.title}, {text.count(threads[-1], 'thread')}" if threads else found.title)
     figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.05 / style.FULL_WIDTH, 0.03 / height), ncol=per_row,
                   borderaxespad=0.2, columnspacing=1.2)
     notes = ["A cell names the fastest kernel and how many times its time the best other kernel takes (paired median). Hatched: the best"
@@ -80,7 +80,11 @@ def _draw(analysis: Analysis, found: Map) -> Drawing:
                      + text.listing([f"{kernel} ({many})" for kernel, many in untimed.items()], 8) + ".")
     executions = sorted({analysis.execution(r) for r in shown})
     notes.append(f"Compared are {text.listing(found.kernels, 12)}, with {text.listing(executions, 3)}.")
-    caption = captions.build(analysis, f"Where each strategy wins, {found.title}",
+    if found.without:
+        notes.append(f"{text.listing(list(found.without), 4)} {'leads' if len(found.without) == 1 else 'lead'} wherever"
+                     f" {'it' if len(found.without) == 1 else 'they'} and these were timed, and {'is' if len(found.without) == 1 else 'are'} left out here.")
+    but = f" but for {text.listing(list(found.without), 4)}" if found.without else ""
+    caption = captions.build(analysis, f"Where each strategy wins{but}, {found.title}",
                              "Find the cell of a scene by its triangles and the pixels that each covers; where the lead is small or the"
                              " cell hatched, the choice matters little.", shown, estimates=None, notes=notes)
     return Drawing(f"map_{found.slug}", strategy_map.SECTION, figure, caption)

@@ -88,7 +88,8 @@ def test_ratios_are_paired(study):
 @pytest.mark.parametrize("steps", [
     [("tile_parallel", "avx512", "none", 9.0), ("scanline", "avx512", "none", 8.0)],  # one rung
     [("tile_parallel", "avx512", "streaming", 9.0), ("tile_parallel", "avx512", "huge_pages", 8.0)],  # neither holds the other
-    [("tile_parallel", "avx512", "none", 9.0), ("scanline", "avx512", "none", 8.0), ("tile_parallel", "avx512", None, 9.0)]])
+    [("tile_parallel", "avx512", "none", 9.0), ("scanline", "avx512", "none", 8.0), ("tile_parallel", "avx512", None, 9.0)],
+    [("tile_parallel", "avx512", "none", 9.0), ("fused_tiles", "avx512", "all", 2.0)]])  # kernels as they are, none twice
 def test_what_is_no_ladder(study, steps):
     analysis, ladders = found(study, steps)
     assert not ladders and not ladder.tables(analysis) and not [d for d in draw(analysis) if d.section == ladder.SECTION]

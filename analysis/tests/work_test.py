@@ -128,7 +128,12 @@ GRID = {(t, p): (t, p) for t in (100, 1000, 10_000) for p in (1.0, 10.0, 100.0)}
 
 @pytest.fixture
 def grid(study):
-    """A grid without its largest cell. scanline wins below 500 triangles, tile_parallel above; in one cell all take the same time."""
+    return write_grid(study)
+
+
+def write_grid(study, everywhere=None):
+    """A grid without its largest cell. scanline wins below 500 triangles, tile_parallel above; in one cell all take the same time.
+    everywhere: a kernel that leads all cells."""
     directory = study(kernels=["tile_parallel", "scanline"], schedules=[("openmp", "static", None)], threads=[1], untimed=False, blocks=14)
     context, records = known(directory)
     base = next(r for r in records if r["config"]["kernel"] == "tile_parallel" and r["config"]["backend"] == "serial")
@@ -146,6 +151,8 @@ def grid(study):
             # 3 % off the grid, as random triangles are.
             new["work"] |= {"triangles": t, "drawn": t, "fragments_covered": int(t * p * 1.03)}
             found.append(new)
+        if everywhere:
+            found.append(copy_of(base, 0.25, scene=scene, scene_hash=scene, kernel=everywhere) | {"work": new["work"]})
     return rewrite(directory, context, found)
 
 
@@ -159,6 +166,18 @@ def test_map_has_the_winners(grid):
     assert all(cell.lead.value == pytest.approx(2, rel=0.02) for place, cell in found.cells.items() if place != (1, 1))
     for (y, _), cell in found.cells.items():
         assert cell.pixels_per_triangle == pytest.approx(1.03 * 10**y, rel=0.01)  # of the work, not of the name
+
+
+def test_a_strategy_that_leads_everywhere_does_not_hide_the_others(study):
+    analysis = analyse(write_grid(study, "fused_tiles"))
+    whole, rest = strategy_map.maps(analysis)
+    assert whole.leaders == {"fused_tiles"} and whole.without == () and rest.without == ("fused_tiles",)
+    assert rest.leaders == {"scanline", "tile_parallel"} and rest.kernels == ["scanline", "tile_parallel"]
+    assert rest.cells[1, 1].winner == strategy_map.TIE
+    assert all(cell.lead.value == pytest.approx(2, rel=0.02) for place, cell in rest.cells.items() if place != (1, 1))
+    first, second = (d for d in draw(analysis) if d.name.startswith("map_"))
+    assert first.name != second.name and "but for fused_tiles" in second.caption.title + second.caption.plain
+    assert len({table.name for table in strategy_map.tables(analysis)}) == 2
 
 
 def test_figure_of_the_map(grid):
