@@ -239,7 +239,7 @@ class Trade:
     def _significant(self, slower: Record, faster: Record, family: float) -> bool:
         """The tests of statistics.compare_with_best, for all pairs of modes of all pictures (Bonferroni)."""
         p = max(statistics.rank_test(slower.samples, faster.samples, family)[0],
-                statistics.launch_test(slower.samples, faster.samples))
+                statistics.launch_tests([slower.samples, faster.samples], best=1)[0])
         return p * family < 1 - statistics.CONFIDENCE
 
 

@@ -245,3 +245,29 @@ def test_exact_rank_sum():
 def test_numbers_that_are_none():
     assert not any(map(s.is_number, (10**400, float("nan"), float("inf"), True, "1", None, [])))
     assert s.is_number(10**300)
+
+
+def launched(rng, factors, launches=5, blocks=4, spread=0.04):
+    """Points of these mean times whose launches differ by `spread`."""
+    cells = np.repeat(np.arange(launches), blocks), np.tile(np.arange(blocks), launches)
+    return [s.Samples(factor * np.exp(np.repeat(rng.normal(0, spread, launches), blocks) + rng.normal(0, 0.01, launches * blocks)), *cells)
+            for factor in factors]
+
+
+def test_five_launches_suffice_for_a_heat_map():
+    """A ratio of 1.5 among 30 points of three panels, whose launches differ by 4 %: alone, four degrees of freedom are too few."""
+    _, comparisons = s.compare_with_best(launched(np.random.default_rng(3), [10.0] * 15 + [15.0] * 15), families=3)
+    assert {c.verdict for c in comparisons[15:]} == {"slower"} and not any(c.verdict == "slower" for c in comparisons[:15])
+
+
+def test_equal_points_whose_launches_differ_are_not_told_apart():
+    rng = np.random.default_rng(5)
+    wrong = sum(any(c.verdict == "slower" for c in s.compare_with_best(launched(rng, [10.0] * 8))[1]) for _ in range(60))
+    assert wrong <= 6  # 0.05 of 60 is 3; more than 6 has a chance of 3 %
+
+
+def test_a_point_of_its_own_spread_is_judged_by_it():
+    quiet = launched(np.random.default_rng(7), [10.0] * 9, spread=0.01)
+    rough = launched(np.random.default_rng(8), [11.5], spread=0.3)
+    p = s.launch_tests([*quiet, *rough], best=0)
+    assert p[0] == 1 and p[-1] == pytest.approx(s.launch_tests([quiet[0], rough[0]], best=0)[1])
