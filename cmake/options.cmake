@@ -36,11 +36,15 @@ function(rasterbench_lanes folder)
   target_sources(${folder} PUBLIC $<TARGET_OBJECTS:${folder}_lanes>)
 endfunction()
 
+# What sanitizers need: the programs need not be compiled a second time.
+add_custom_target(unit_tests)
+
 # rasterbench_test(FOLDER sources... LIBRARIES folders...): FOLDER_test, the unit tests that sit beside the sources.
 function(rasterbench_test folder)
   cmake_parse_arguments(ARG "" "" "LIBRARIES" ${ARGN})
   add_executable(${folder}_test ${ARG_UNPARSED_ARGUMENTS})
   target_link_libraries(${folder}_test PRIVATE ${ARG_LIBRARIES} GTest::gtest_main)
+  add_dependencies(unit_tests ${folder}_test)
   # Tests run side by side, on more threads than CPUs: waiting threads that spin would take the CPU from those they wait for.
   gtest_discover_tests(${folder}_test TEST_PREFIX "${folder}." DISCOVERY_TIMEOUT 60
                        PROPERTIES ENVIRONMENT OMP_WAIT_POLICY=passive)
