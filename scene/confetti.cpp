@@ -1,6 +1,6 @@
 // confetti: equilateral triangles at random places, in random orientations, all inside the picture: the load
-// is even over the picture and, with distribution=heavy, very uneven over the triangles: what schedules
-// differ in.
+// is even over the picture and, with distribution=heavy, very uneven over the triangles or, with
+// distribution=corner, over the picture: what schedules differ in.
 //
 // Size: a triangle of s pixels that faces the camera has edges of s pixels in a picture of 1080 lines (s
 // H/1080 in one of H lines), whatever its distance; then it is turned at random, which halves its area on
@@ -9,6 +9,10 @@
 //   heavy    s from a Pareto distribution with alpha = 16/13 = 1.23 without its largest 1/256: mean `size`,
 //            smallest 0.29 size, largest 26 size (at most 800 pixels: above size = 30 the mean is therefore
 //            lower). 0.7 % of the triangles then have half of the area.
+//   corner   sizes as uniform; the centres of nine of ten triangles lie in the upper left corner, a quarter
+//   of
+//            the picture wide and high, and the others anywhere: its rows and tiles have 145 times the
+//            triangles that others of equal area have.
 // A triangle is wholly in the picture, so the large ones keep away from its border.
 //
 // Only + - * / and sqrt are used, so that the bytes are the same everywhere: 1/alpha = 1/2 + 1/4 + 1/16 makes
@@ -32,6 +36,8 @@ constexpr double kTail = 1.0 / 256;            // heavy: (smallest / largest)^al
 constexpr double kTailPower = 0.35355339059327373;  // kTail^(3/16) = (smallest / largest)^(alpha - 1)
 // Heavy: mean over smallest size, alpha/(alpha-1) (1 - (smallest/largest)^(alpha-1)) / (1 - kTail).
 constexpr double kMeanOverSmallest = 16.0 / 3.0 * (1 - kTailPower) / (1 - kTail);
+constexpr double kInCorner = 0.9;     // corner: share of the triangles whose centres lie there
+constexpr double kCornerSide = 0.25;  // corner: its width and height as shares of the picture's
 constexpr double kSqrt3 = 1.7320508075688772;
 
 double dot(const Vec3d& a, const Vec3d& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
@@ -70,7 +76,10 @@ Vec3d random_direction_across(Random& random, const Vec3d& axis) {
   }
 }
 
-Triangle random_triangle(Random& random, double pixels) {
+/// Anywhere in the picture, or in its upper left corner.
+enum class Region { kPicture, kCorner };
+
+Triangle random_triangle(Random& random, double pixels, Region region) {
   // In units of the distance to the camera: the radius of the circle through the corners, and the window that
   // the centre may lie in so that the sphere of that radius stays between the four side planes.
   const double radius =
@@ -79,8 +88,9 @@ Triangle random_triangle(Random& random, double pixels) {
   const double window_x = tan_x - radius * std::sqrt(1 + tan_x * tan_x);
   const double window_y = kTanHalf - radius * std::sqrt(1 + kTanHalf * kTanHalf);
   const double distance = random.uniform(kNearest, kFarthest);
-  const Vec3d centre{distance * random.uniform(-window_x, window_x),
-                     distance * random.uniform(-window_y, window_y), kDistance - distance};
+  const double part = 2 * (region == Region::kCorner ? kCornerSide : 1);
+  const Vec3d centre{distance * random.uniform(-window_x, part * window_x - window_x),
+                     distance * random.uniform(window_y - part * window_y, window_y), kDistance - distance};
 
   const Vec3d u = random_direction(random);
   const Vec3d v = random_direction_across(random, u);
@@ -96,14 +106,16 @@ Triangle random_triangle(Random& random, double pixels) {
 Scene make_confetti(const GeneratorValues& values) {
   const std::int64_t count = values.integer("triangles");
   const double size = values.number("size");
-  const bool heavy = values.integer("distribution") == 1;
+  const bool heavy = values.integer("distribution") == 1, corner = values.integer("distribution") == 2;
   Random random(static_cast<std::uint64_t>(values.integer("seed")));
 
   Scene scene;
   scene.model.triangles = room_for_triangles(count);
   for (std::int64_t i = 0; i < count; ++i) {
     const double pixels = random_size(random, size, heavy);
-    scene.model.triangles.push_back(random_triangle(random, pixels));
+    const bool hot = corner && random.uniform() < kInCorner;
+    scene.model.triangles.push_back(
+        random_triangle(random, pixels, hot ? Region::kCorner : Region::kPicture));
   }
   scene.parameters.camera = {0, 0, kDistance};
   scene.parameters.near_plane = 1;  // the largest triangle reaches from 1.3 to 8.2
@@ -113,7 +125,8 @@ Scene make_confetti(const GeneratorValues& values) {
 
 const GeneratorRegistration kConfetti({
     .name = "confetti",
-    .meaning = "random triangles all over the picture, of like or of very unlike size: load balance",
+    .meaning = "random triangles, all over the picture or most in one corner, of like or of very unlike "
+               "size: load balance",
     .keys = {{.name = "triangles",
               .meaning = "number",
               .default_value = 100000,
@@ -131,8 +144,9 @@ const GeneratorRegistration kConfetti({
               .minimum = 0.1,
               .maximum = 500},
              {.name = "distribution",
-              .meaning = "of the sizes: uniform in 0.5..1.5 size, or heavy (Pareto, alpha 1.23)",
-              .words = {"uniform", "heavy"}}},
+              .meaning = "uniform: sizes in 0.5..1.5 size; heavy: Pareto sizes, alpha 1.23; corner: sizes as "
+                         "uniform, nine of ten triangles in the upper left sixteenth of the picture",
+              .words = {"uniform", "heavy", "corner"}}},
     .make = make_confetti,
 });
 

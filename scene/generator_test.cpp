@@ -98,6 +98,7 @@ TEST(Generators, TheSameBytesEverywhere) {
   EXPECT_EQ(bytes_hash("terrain:triangles=1000,seed=2,roughness=0.7"), "6d46d42c7d8c0585");
   EXPECT_EQ(bytes_hash("confetti:triangles=1000"), "0e7f941a7b3fde94");
   EXPECT_EQ(bytes_hash("confetti:triangles=1000,seed=2,distribution=heavy"), "4aec9c449349b608");
+  EXPECT_EQ(bytes_hash("confetti:triangles=1000,distribution=corner"), "394ab4efdc31542c");
   EXPECT_EQ(bytes_hash("layers:triangles=1000"), "5741f92733991a02");
   EXPECT_EQ(bytes_hash("layers:triangles=1000,order=random,seed=2"), "182c3791b020fd96");
 }
@@ -133,7 +134,8 @@ TEST(Generators, EveryTriangleIsFiniteHasAnAreaAndIsInFrontOfNear) {
        {"teapot", "teapot:triangles=64", "teapot:triangles=3e5", "terrain", "terrain:triangles=2",
         "terrain:triangles=1e5,roughness=1,seed=3", "terrain:roughness=0", "confetti", "confetti:size=0.1",
         "confetti:size=500,triangles=1e4", "confetti:distribution=heavy",
-        "confetti:size=0.1,distribution=heavy", "layers", "layers:depth=1000,order=random"}) {
+        "confetti:size=0.1,distribution=heavy", "confetti:distribution=corner", "layers",
+        "layers:depth=1000,order=random"}) {
     const Scene scene = generate(specification);
     check_scene_parameters(scene.parameters, specification);
     EXPECT_EQ(scene.parameters.width, 1920);
@@ -254,7 +256,8 @@ TEST(Terrain, RoughnessIsRough) {
 TEST(Confetti, IsAllInThePicture) {
   for (const std::string specification :
        {"confetti:triangles=3e4", "confetti:triangles=3e4,distribution=heavy",
-        "confetti:triangles=3e3,size=500", "confetti:triangles=3e4,size=500,distribution=heavy"}) {
+        "confetti:triangles=3e3,size=500", "confetti:triangles=3e4,size=500,distribution=heavy",
+        "confetti:triangles=3e3,size=500,distribution=corner"}) {
     const Scene scene = generate(specification);
     const Camera camera = make_camera(scene.parameters);
     for (const Triangle& t : scene.model.triangles) {
@@ -286,6 +289,22 @@ TEST(Confetti, SizesHaveTheirMean) {
     EXPECT_NEAR(smallest, heavy ? 2.89 : 5, 0.01);
     EXPECT_NEAR(largest, heavy ? 261.5 : 15, heavy ? 2 : 0.01);
   }
+}
+
+TEST(Confetti, NineOfTenAreInTheCorner) {
+  const auto in_corner = [](const std::string& distribution) {
+    const Scene scene = generate("confetti:triangles=1e5,size=4,distribution=" + distribution);
+    const Camera camera = make_camera(scene.parameters);
+    std::size_t inside = 0;
+    for (const Triangle& t : scene.model.triangles) {
+      const ScreenPoint a = project(camera, t.a), b = project(camera, t.b), c = project(camera, t.c);
+      const double x = (a.x + b.x + c.x) / 3, y = (a.y + b.y + c.y) / 3;  // y up, both in -1..1
+      inside += x < -0.5 && y > 0.5;
+    }
+    return static_cast<double>(inside) / 1e5;
+  };
+  EXPECT_NEAR(in_corner("corner"), 0.9 + 0.1 / 16, 0.01);
+  EXPECT_NEAR(in_corner("uniform"), 1.0 / 16, 0.005);
 }
 
 TEST(Layers, EveryWallFillsThePictureInItsOrder) {
