@@ -12,7 +12,7 @@ from ..lost_time import TERMS, LostTime
 from .common import Block, Drawing, Row, drawn_together, named, pages, part, row_frame
 
 MOST = 30  # rows; with more, only the fastest execution of each kernel and backend
-LOOKS = {"useful": ("#D9D9D9", ""), "inflation": (style.COLOURS[1], ""), "imbalance": (style.COLOURS[0], ""), "dispatch": (style.COLOURS[4], "////"),
+LOOKS = {"useful": ("#D9D9D9", ""), "inflation": (style.COLOURS[1], ""), "imbalance": (style.COLOURS[0], "----"), "dispatch": (style.COLOURS[4], "////"),
          "synchronisation": (style.COLOURS[2], "...."), "serial": (style.COLOURS[3], "xxxx"), "others": (style.COLOURS[5], "\\\\\\\\"),
          "residual": ("#FFFFFF", "++++")}
 NAMES = {"useful": "T(1): the work of one thread"} | TERMS
