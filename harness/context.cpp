@@ -14,6 +14,7 @@
 
 #include "base/hash.h"
 #include "build_info.h"
+#include "harness/hypothesis.h"
 
 extern char** environ;
 
@@ -138,6 +139,14 @@ Json describe_context(const Study& study, const StudyOptions& options,
                         {"launches", sampling.launches},
                         {"time_limit_s", sampling.time_limit}}}};
   if (sampling.frame_seconds > 0) context["study"]["sampling"]["frame_seconds"] = sampling.frame_seconds;
+  if (!study.hypotheses.empty()) context["study"]["hypotheses"] = hypotheses_to_json(study.hypotheses);
+  for (const WeakSeries& series : study.weak) {
+    Json steps = Json::array();
+    for (const auto& [threads, step] : series.steps)
+      steps.push_back({{"threads", threads}, {"scene", step.scene}, {"size", {step.width, step.height}}});
+    context["study"]["weak"].push_back(
+        {{"kind", series.kind}, {"scene", series.scene}, {"size", series.size}, {"steps", steps}});
+  }
   context["overrides"] = {
       {"scenes", options.scenes}, {"sizes", options.sizes}, {"oversubscribe", options.oversubscribe}};
   if (options.cpus) context["overrides"]["cpus"] = *options.cpus;

@@ -249,10 +249,13 @@ class Coordinator {
     return fastest;
   }
 
-  /// Points to sample in the next block: those that have not stopped, and the bases that these are compared
-  /// with.
+  /// Points to sample in the next block: those that have not stopped, and the bases and partners that these
+  /// are compared with.
   std::vector<PointState*> next_block() {
     std::map<std::string, bool> open_comparison, open_curve, open_trade;
+    std::set<std::string> partners;
+    for (const PointState& state : states_)
+      if (state.open()) partners.insert(state.planned->partners.begin(), state.planned->partners.end());
     for (const PointState& state : states_)
       if (state.open())
         open_comparison[comparison_of(state.planned->point)] = open_curve[curve_of(state.planned->point)] =
@@ -264,6 +267,7 @@ class Coordinator {
       const Point& point = state.planned->point;
       const auto base = fastest.find(comparison_of(point));
       const bool is_base =
+          partners.contains(state.planned->name) ||
           (base != fastest.end() && base->second == &state && open_comparison[comparison_of(point)]) ||
           (point.execution.threads == 1 && !is_peer(point) && open_curve[curve_of(point)]) ||
           (is_literal_program(point) && open_trade[trade_of(point)]);

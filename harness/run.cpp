@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "base/hash.h"
+#include "harness/hypothesis.h"
 #include "harness/statistics.h"
 
 namespace rasterbench {
@@ -87,6 +88,8 @@ Json start_event(const Study& study, const std::vector<PointState>& states, cons
   event["scenes"] = study.hashes;
   event["plan"] = hash_bytes(plan);
   event["sampling"] = sampling_of(study);
+  // In the journal before the first sample: what is claimed later is no hypothesis.
+  if (!study.hypotheses.empty()) event["hypotheses"] = hypotheses_to_json(study.hypotheses);
   return event;
 }
 
@@ -94,8 +97,8 @@ void replay(const std::vector<Json>& events, const Json& start, const std::files
             std::vector<PointState>& states) {
   if (events.empty() || text_or(events.front(), "event") != "start")
     throw InputError({.file = file.string(), .line = 1}, "does not start with a start event");
-  for (const char* key : {"schema", "build", "study", "scenes", "plan", "sampling"})
-    if (!events.front().contains(key) || events.front().at(key) != start.at(key))
+  for (const char* key : {"schema", "build", "study", "scenes", "plan", "sampling", "hypotheses"})
+    if (events.front().value(key, Json()) != start.value(key, Json()))
       throw InputError({.file = file.string(), .line = 1, .field = key},
                        "differs from this study: --resume continues only what it started");
   std::map<std::string, PointState*> by_id;

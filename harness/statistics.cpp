@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace rasterbench {
 namespace {
@@ -29,6 +30,20 @@ double p_of_tail(int k, int n, double tail) {
     (at_least(k, n, middle) < tail ? low : high) = middle;
   }
   return (low + high) / 2;
+}
+
+/// P(|T| < t) for Student's T.
+double student_t_within(double t, int freedom) {
+  const double angle = std::atan(t / std::sqrt(static_cast<double>(freedom)));
+  const double sine = std::sin(angle), square = std::cos(angle) * std::cos(angle);
+  const bool odd = freedom % 2 == 1;
+  // A power series in cos^2 with freedom / 2 terms; odd numbers start with cos, even ones with 1.
+  double sum = 0, term = odd ? std::cos(angle) : 1;
+  for (int k = odd ? 3 : 2; k <= freedom; k += 2) {
+    sum += term;
+    term *= square * (k - 1) / k;
+  }
+  return odd ? 2 / std::numbers::pi * (angle + sine * sum) : sine * sum;
 }
 
 }  // namespace
@@ -65,6 +80,16 @@ std::pair<double, double> proportion_interval(int successes, int trials) {
   constexpr double kTail = 0.025;
   return {successes == 0 ? 0 : p_of_tail(successes, trials, kTail),
           successes == trials ? 1 : p_of_tail(successes + 1, trials, 1 - kTail)};
+}
+
+double student_t_quantile(double p, int freedom) {
+  double low = 0, high = 1;
+  while (student_t_within(high, freedom) < 2 * p - 1) high *= 2;
+  for (int step = 0; step < 80; ++step) {
+    const double middle = (low + high) / 2;
+    (student_t_within(middle, freedom) < 2 * p - 1 ? low : high) = middle;
+  }
+  return (low + high) / 2;
 }
 
 }  // namespace rasterbench

@@ -24,4 +24,8 @@ std::optional<double> percentile_95(std::span<const double> values);
 /// Precondition: 0 <= successes <= trials, trials > 0.
 std::pair<double, double> proportion_interval(int successes, int trials);
 
+/// The quantile of Student's distribution: P(T <= result) = p (Abramowitz & Stegun, 26.7.3 and 26.7.4).
+/// Preconditions: 0.5 <= p < 1, freedom > 0.
+double student_t_quantile(double p, int freedom);
+
 }  // namespace rasterbench

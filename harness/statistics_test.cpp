@@ -46,6 +46,17 @@ TEST(Statistics, IntervalCoversTheMedianAsOftenAsItSays) {
   EXPECT_LT(covered, kTrials * 98 / 100);
 }
 
+TEST(Statistics, StudentQuantilesAreThoseOfTheTables) {
+  EXPECT_NEAR(student_t_quantile(0.975, 1), 12.706, 5e-4);
+  EXPECT_NEAR(student_t_quantile(0.975, 2), 4.303, 5e-4);
+  EXPECT_NEAR(student_t_quantile(0.975, 4), 2.776, 5e-4);
+  EXPECT_NEAR(student_t_quantile(0.995, 9), 3.250, 5e-4);
+  EXPECT_NEAR(student_t_quantile(0.8, 4), 0.941, 5e-4);
+  EXPECT_NEAR(student_t_quantile(0.975, 100), 1.984, 5e-4);
+  EXPECT_NEAR(student_t_quantile(0.975, 10001), 1.960, 5e-4);
+  EXPECT_NEAR(student_t_quantile(0.5, 3), 0, 1e-9);
+}
+
 TEST(Statistics, Percentile) {
   EXPECT_FALSE(percentile_95(one_to(58)));
   EXPECT_EQ(percentile_95(one_to(100)), 95);

@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <set>
 
 #include "base/error.h"
 #include "base/suggest.h"
+#include "harness/hypothesis.h"
 #include "harness/study_reader.h"
 #include "kernels/kernel.h"
 #include "reference/ray_cast_frame.h"
@@ -74,6 +76,108 @@ std::size_t index_of(const std::string& name, std::vector<std::string>& seen) {
   return index;
 }
 
+/// Opens the scene of `reference` unless its name is known already.
+void open_once(const SceneReference& reference, std::map<std::string, SceneReference>& references,
+               Study& study) {
+  const auto [known, is_new] = references.emplace(reference.name, reference);
+  const bool from_file = reference.line > 0;
+  const Place place{.file = from_file ? study.file : "",
+                    .line = from_file ? std::optional(reference.line) : std::nullopt,
+                    .field = from_file ? "scene" : "--scene"};
+  if (known->second.model != reference.model || known->second.parameters != reference.parameters)
+    throw InputError(place, fmt::format("two scenes are named '{}': {} and {}", reference.name,
+                                        known->second.model, reference.model));
+  if (!is_new) return;
+  try {
+    Scene scene = open_scene(reference.model, reference.parameters);
+    study.hashes[reference.name] = scene_hash(scene);
+    study.scenes.emplace(reference.name, std::move(scene));
+  } catch (const InputError& error) {
+    throw InputError(place, error.what());
+  }
+}
+
+/// Adds the pictures of a weak sweep, which is one of a number of threads, to the series that they belong to.
+void add_weak_step(const Sweep& sweep, const std::map<std::string, Scene>& scenes,
+                   std::vector<WeakSeries>& all) {
+  for (std::size_t i = 0; i < sweep.weak_scenes.size(); ++i) {
+    const std::string& name = sweep.scenes[i].name;
+    const SceneParameters& own = scenes.at(name).parameters;
+    std::vector<std::pair<int, int>> sizes = sweep.sizes;
+    std::vector<std::string> words = sweep.weak_sizes;
+    if (sizes.empty()) {
+      sizes.emplace_back(own.width, own.height);
+      words.push_back(fmt::format("{}x{}", own.width, own.height));
+    }
+    for (std::size_t k = 0; k < sizes.size(); ++k) {
+      auto series = std::find_if(all.begin(), all.end(), [&](const WeakSeries& known) {
+        return known.kind == sweep.weak && known.scene == sweep.weak_scenes[i] && known.size == words[k];
+      });
+      if (series == all.end())
+        series = all.insert(all.end(), WeakSeries{sweep.weak, sweep.weak_scenes[i], words[k], {}});
+      series->steps[sweep.threads.front()] = {name, sizes[k].first, sizes[k].second};
+    }
+  }
+}
+
+/// Tells each point which others its blocks must hold: pairs need both.
+void add_partners(const Study& study, const std::map<std::string, SceneReference>& references,
+                  std::vector<PlannedPoint>& points) {
+  std::map<std::string, PlannedPoint*> by_name;
+  for (PlannedPoint& planned : points) by_name[planned.name] = &planned;
+  for (const WeakSeries& series : study.weak)
+    for (PlannedPoint& planned : points) {
+      if (planned.point.execution.threads == 1 || !series.has(planned.point)) continue;
+      const WeakStep& first = series.steps.at(1);
+      Point base = planned.point;
+      base.scene = references.at(first.scene);
+      base.width = first.width;
+      base.height = first.height;
+      base.execution.threads = 1;
+      if (is_peer(base)) base = peer_point(base.kernel, base.scene, base.width, base.height, 1);
+      planned.partners.push_back(point_name(base));
+    }
+  for (const Hypothesis& hypothesis : study.hypotheses) {
+    if (!hypothesis.untested.empty()) continue;
+    std::vector<std::string> sides = hypothesis.faster;
+    sides.insert(sides.end(), hypothesis.slower.begin(), hypothesis.slower.end());
+    for (const std::string& name : sides)
+      for (const std::string& other : sides)
+        if (other != name) by_name.at(name)->partners.push_back(other);
+  }
+}
+
+/// Each family's name, by what `family_name` gives its points; those that hypotheses and weak scaling compare
+/// have one.
+std::map<std::string, std::string> joined_families(
+    const Study& study, const std::vector<PlannedPoint>& points,
+    const std::function<std::string(const Point&)>& family_name) {
+  std::map<std::string, std::string> joined, of_point;
+  for (const PlannedPoint& planned : points) {
+    const std::string name = family_name(planned.point);
+    joined.emplace(name, name);
+    of_point.emplace(planned.name, name);
+  }
+  const auto join = [&](const std::string& a, const std::string& b) {
+    const auto first = of_point.find(a), second = of_point.find(b);
+    if (first == of_point.end() || second == of_point.end()) return;  // left out by the filter
+    const std::string kept = joined.at(first->second), replaced = joined.at(second->second);
+    for (auto& [name, family] : joined)
+      if (family == replaced) family = kept;
+  };
+  for (const PlannedPoint& planned : points)
+    for (const std::string& partner : planned.partners) join(partner, planned.name);
+  for (const WeakSeries& series : study.weak) {
+    const PlannedPoint* first = nullptr;
+    for (const PlannedPoint& planned : points) {
+      if (!series.has(planned.point)) continue;
+      if (first) join(first->name, planned.name);
+      if (!first) first = &planned;
+    }
+  }
+  return joined;
+}
+
 }  // namespace
 
 std::string comparison_of(const Point& point) {
@@ -110,47 +214,42 @@ Study read_study(const std::filesystem::path& file, const StudyOptions& options)
   const PlanTarget target{options.cpus.value_or(available_cpus()), options.isa.value_or(best_isa())};
   const std::vector<Sweep> sweeps = read_sweeps(file, study.text, target, options.scenes, options.sizes);
 
-  std::set<std::string> names, trades, pictures;  // trades with a literal program, pictures with a peer
-  std::vector<PlannedPoint> all;
+  Selectable whole;
+  whole.replaced = !options.scenes.empty() || !options.sizes.empty();
+  std::set<std::string> names;
   std::map<std::string, SceneReference> references;
   for (const Sweep& sweep : sweeps) {
-    for (const SceneReference& reference : sweep.scenes) {
-      const auto [known, is_new] = references.emplace(reference.name, reference);
-      const bool from_file = reference.line > 0;
-      const Place place{.file = from_file ? study.file : "",
-                        .line = from_file ? std::optional(reference.line) : std::nullopt,
-                        .field = from_file ? "scene" : "--scene"};
-      if (known->second.model != reference.model || known->second.parameters != reference.parameters)
-        throw InputError(place, fmt::format("two scenes are named '{}': {} and {}", reference.name,
-                                            known->second.model, reference.model));
-      if (!is_new) continue;
-      try {
-        Scene scene = open_scene(reference.model, reference.parameters);
-        study.hashes[reference.name] = scene_hash(scene);
-        study.scenes.emplace(reference.name, std::move(scene));
-      } catch (const InputError& error) {
-        throw InputError(place, error.what());
-      }
-    }
+    for (const SceneReference& reference : sweep.scenes) open_once(reference, references, study);
     span_points(sweep, study.scenes, [&](const Point& point) {
       PlannedPoint planned{point, point_name(point), {}};
-      if (!names.insert(planned.name).second) return;
-      if (options.filter && std::regex_search(planned.name, *options.filter) == options.filter_excludes)
-        return;
-      if (is_peer(point)) pictures.insert(picture_of(point));
-      if (is_literal_program(point)) trades.insert(trade_of(without_isa(point)));
-      all.push_back(std::move(planned));
+      if (names.insert(planned.name).second) whole.points.push_back(std::move(planned));
     });
+    add_weak_step(sweep, study.scenes, whole.weak);
   }
+  study.weak = whole.weak;
+  study.hypotheses = read_hypotheses(file, study.text, target, whole);
+  add_partners(study, references, whole.points);
+
+  std::set<std::string> trades, pictures;  // trades with a literal program, pictures with a peer
+  std::vector<PlannedPoint> all;
+  for (PlannedPoint& planned : whole.points) {
+    if (options.filter && std::regex_search(planned.name, *options.filter) == options.filter_excludes)
+      continue;
+    if (is_peer(planned.point)) pictures.insert(picture_of(planned.point));
+    if (is_literal_program(planned.point)) trades.insert(trade_of(without_isa(planned.point)));
+    all.push_back(std::move(planned));
+  }
+  const auto family_name = [&](const Point& point) {
+    const std::string trade = trade_of(without_isa(point)), picture = picture_of(point);
+    return pictures.contains(picture) ? picture
+           : trades.contains(trade)   ? trade
+                                      : comparison_of(without_isa(point));
+  };
+  const std::map<std::string, std::string> joined = joined_families(study, all, family_name);
   std::vector<std::string> families;
   for (PlannedPoint& planned : all) {
     const Point& point = planned.point;
-    const std::string trade = trade_of(without_isa(point));
-    const std::string picture = picture_of(point);
-    planned.family = index_of(pictures.contains(picture) ? picture
-                              : trades.contains(trade)   ? trade
-                                                         : comparison_of(without_isa(point)),
-                              families);
+    planned.family = index_of(joined.at(family_name(point)), families);
     if (planned.family % static_cast<std::size_t>(options.shards) !=
         static_cast<std::size_t>(options.shard - 1))
       continue;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "harness/point.h"
+#include "harness/weak.h"
 
 namespace rasterbench {
 
@@ -29,6 +30,18 @@ struct PlannedPoint {
   std::string name;
   std::string skip;        ///< the reason, or empty
   std::size_t family = 0;  ///< of Study::families, from 0: see read_study()
+  /// Names of points that are sampled in every block that this one is: its base in weak scaling, and those
+  /// that a hypothesis compares it with.
+  std::vector<std::string> partners = {};
+};
+
+/// What a study claims before it runs: that one point is faster than another by a stated effect. Several
+/// points of a side stand for the fastest of them.
+struct Hypothesis {
+  std::string claim;
+  double by = 0;  ///< least effect: time of slower / time of faster is at least 1 + by
+  std::vector<std::string> faster, slower;  ///< names of points, whatever the filter and the shard
+  std::string untested;  ///< why this machine, or what the command line replaced, lets it select nothing
 };
 
 struct Study {
@@ -39,7 +52,9 @@ struct Study {
   std::uint64_t seed = 1;
   SamplingPlan sampling;
   std::vector<PlannedPoint> points;
-  std::size_t families = 0;                   ///< of the whole study, whatever the shard
+  std::size_t families = 0;  ///< of the whole study, whatever the shard
+  std::vector<Hypothesis> hypotheses;
+  std::vector<WeakSeries> weak;
   std::map<std::string, Scene> scenes;        ///< by SceneReference::name
   std::map<std::string, std::string> hashes;  ///< scene_hash, by the same name
 };
@@ -63,7 +78,8 @@ struct StudyOptions {
 ///
 /// Points are parted into families, and shards hold whole ones, so that a speedup never compares two
 /// machines: a family is a comparison, bases included, with all instruction sets (where there is a literal
-/// program, all of its trade; where there is a peer, all of its scene and size).
+/// program, all of its trade; where there is a peer, all of its scene and size). Families that a hypothesis
+/// or weak scaling compares are one.
 Study read_study(const std::filesystem::path& file, const StudyOptions& options);
 
 /// What `point` is compared with: equal for points that differ only in strategy, execution and environment.

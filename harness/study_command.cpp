@@ -11,6 +11,7 @@
 #include "harness/context.h"
 #include "harness/coordinator.h"
 #include "harness/option_checks.h"
+#include "harness/plan_forecast.h"
 #include "harness/run.h"
 #include "harness/runner.h"
 #include "scene/image.h"
@@ -22,7 +23,7 @@ struct StudyArguments {
   std::string file, out, filter, shard, family, isa;
   std::vector<std::string> scenes, sizes;
   bool resume = false, replace = false, dry_run = false, list = false, json = false, oversubscribe = false;
-  double time_limit = -1;
+  double time_limit = -1, noise = -1;
   int cpus = 0;
 };
 
@@ -247,7 +248,18 @@ void add_study_command(CLI::App& app, Outcome& outcome, const std::vector<std::s
       ->add_flag("--replace", a->replace,
                  "start afresh; the old folder is kept as DIR.previous, DIR.previous-2, ...")
       ->excludes("--resume");
-  command->add_flag("--dry-run", a->dry_run, "print the points and what would be skipped, run nothing");
+  const auto dry_run = command->add_flag(
+      "--dry-run", a->dry_run,
+      "print the points, what would be skipped, what each hypothesis can detect and the cost in minutes; run "
+      "nothing");
+  command
+      ->add_option(
+          "--noise", a->noise,
+          fmt::format("with --dry-run: standard deviation of a sample, as a share of its time, where no "
+                      "finished run in the --out folder tells (default: {:g})",
+                      kAssumedNoise))
+      ->check(number_check(1e-6, 10))
+      ->needs(dry_run);
   command->add_flag("--list", a->list, "print the names of the points only");
   command->add_flag("--json", a->json, "with --list: the families of the study and the ids of their points")
       ->needs("--list");
@@ -280,9 +292,15 @@ void add_study_command(CLI::App& app, Outcome& outcome, const std::vector<std::s
     Study study = read_study(a->file, options);
     apply_benchmark_flags(benchmark_flags, *a, &study, coordinator);
     if (a->json) return print_plan_as_json(study, options);
-    if (a->list || a->dry_run) return print_plan(study, a->list);
-    check_target(study, options, a->family);
     coordinator.out = a->out.empty() ? "results/" + study.name : a->out;
+    if (a->list || a->dry_run) {
+      print_plan(study, a->list);
+      if (!a->list)
+        fmt::print("{}", forecast(study, read_earlier_run(coordinator.out),
+                                  a->noise > 0 ? std::optional(a->noise) : std::nullopt));
+      return;
+    }
+    check_target(study, options, a->family);
     if (!coordinator.out.has_filename()) coordinator.out = coordinator.out.parent_path();  // DIR/ means DIR
     if (std::filesystem::exists(coordinator.out) && a->replace)
       coordinator.out =

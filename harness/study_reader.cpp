@@ -1,7 +1,6 @@
 #include "harness/study_reader.h"
 
 #include <fmt/format.h>
-#include <toml++/toml.h>
 
 #include <algorithm>
 #include <fstream>
@@ -9,112 +8,12 @@
 
 #include "base/error.h"
 #include "base/suggest.h"
+#include "harness/table_reader.h"
+#include "harness/weak.h"
 #include "kernels/kernel.h"
 
 namespace rasterbench {
 namespace {
-
-/// Reads the values of one table and remembers which keys were asked for, so that the others are errors.
-class TableReader {
- public:
-  TableReader(const toml::table& table, std::string file) : table_(table), file_(std::move(file)) {}
-
-  [[noreturn]] void fail(const toml::node& node, const std::string& key, const std::string& message) const {
-    throw InputError(
-        {.file = file_, .line = static_cast<std::int64_t>(node.source().begin.line), .field = key}, message);
-  }
-
-  /// Runs `parse`, putting file and line in front of what it throws.
-  template <class Parse>
-  auto located(const toml::node& node, const std::string& key, Parse parse) const {
-    try {
-      return parse();
-    } catch (const InputError& error) {
-      fail(node, key, error.what());
-    }
-  }
-
-  const toml::node* find(const std::string& key) {
-    known_.push_back(key);
-    return table_.get(key);
-  }
-
-  void number(const std::string& key, double low, double high, double& value) {
-    const toml::node* node = find(key);
-    if (!node) return;
-    const auto read = node->value<double>();  // empty for an integer that no double holds
-    if (!node->is_number() || !read || !(*read >= low) || !(*read <= high))
-      fail(*node, key, fmt::format("must be a number from {:g} to {:g}", low, high));
-    value = *read;
-  }
-
-  void integer(const std::string& key, std::int64_t low, std::int64_t high, auto& value) {
-    const toml::node* node = find(key);
-    if (!node) return;
-    const auto read = node->value<std::int64_t>();
-    if (!node->is_integer() || *read < low || *read > high)
-      fail(*node, key, fmt::format("must be a whole number from {} to {}", low, high));
-    value = static_cast<std::remove_reference_t<decltype(value)>>(*read);
-  }
-
-  void text(const std::string& key, std::string& value) {
-    const toml::node* node = find(key);
-    if (!node) return;
-    if (!node->is_string()) fail(*node, key, "must be a string");
-    value = *node->value<std::string>();
-  }
-
-  /// Calls visit(node) for the elements of a list, or for a single value.
-  void each(const std::string& key, const std::function<void(const toml::node&)>& visit) {
-    const toml::node* node = find(key);
-    if (!node) return;
-    const toml::array* array = node->as_array();
-    if (!array) return visit(*node);
-    if (array->empty()) fail(*node, key, "is an empty list");
-    for (const toml::node& element : *array) visit(element);
-  }
-
-  /// A list of strings (or one), each turned into a value by parse(string).
-  template <class Value, class Parse>
-  void strings(const std::string& key, std::vector<Value>& values, Parse parse) {
-    each(key, [&](const toml::node& node) {
-      if (!node.is_string()) fail(node, key, "must be a string or a list of strings");
-      values.push_back(located(node, key, [&] { return parse(*node.value<std::string>()); }));
-    });
-  }
-
-  void words(const std::string& key, const std::vector<std::string>& known, const std::string& fallback,
-             std::vector<std::string>& values) {
-    strings(key, values, [&](const std::string& word) {
-      if (std::find(known.begin(), known.end(), word) == known.end())
-        throw InputError(unknown_name("value", word, known));
-      return word;
-    });
-    if (values.empty()) values.push_back(fallback);
-  }
-
-  void reject_unknown_keys(const std::string& where) const {
-    for (const auto& [key, node] : table_)
-      if (const std::string name(key.str()); std::find(known_.begin(), known_.end(), name) == known_.end())
-        throw InputError(
-            {.file = file_, .line = static_cast<std::int64_t>(key.source().begin.line), .field = name},
-            unknown_name("key of " + where, name, known_));
-  }
-
- private:
-  const toml::table& table_;
-  std::string file_;
-  std::vector<std::string> known_;
-};
-
-toml::table parse_toml(const std::string& text, const std::string& file) {
-  try {
-    return toml::parse(text, file);
-  } catch (const toml::parse_error& error) {
-    throw InputError({.file = file, .line = static_cast<std::int64_t>(error.source().begin.line)},
-                     std::string(error.description()));
-  }
-}
 
 void read_sampling(const toml::table& table, const std::string& file, SamplingPlan& sampling) {
   TableReader reader(table, file);
@@ -236,6 +135,39 @@ SceneReference read_scene(const TableReader& sweep, const toml::node& node, cons
   return scene;
 }
 
+/// A size; of weak = "pixels" that of one thread, which "*threads" stands behind.
+std::pair<int, int> parse_sweep_size(const std::string& text, const std::string& weak,
+                                     const std::string& field) {
+  const bool grows = text.ends_with(kTimesThreads);
+  if (grows != (weak == "pixels"))
+    throw InputError({.field = field},
+                     grows ? fmt::format("'{}' grows with the threads: needs weak = \"pixels\"", text)
+                           : fmt::format("'{}' does not grow: weak = \"pixels\" needs sizes such as "
+                                         "\"960x540{}\"",
+                                         text, kTimesThreads));
+  return parse_size(text.substr(0, grows ? text.size() - kTimesThreads.size() : text.size()), field);
+}
+
+/// A weak sweep as one for each number of threads; any other as it is.
+std::vector<Sweep> with_weak_steps(const Sweep& sweep) {
+  if (sweep.weak.empty()) return {sweep};
+  std::vector<Sweep> steps;
+  for (const int threads : sweep.threads) {
+    Sweep& step = steps.emplace_back(sweep);
+    step.threads = {threads};
+    for (SceneReference& scene : step.scenes) {
+      step.weak_scenes.push_back(scene.name);
+      if (sweep.weak == "triangles") scene = scene_for_threads(scene, threads);
+    }
+    for (auto& size : step.sizes) {
+      const std::string one = fmt::format("{}x{}", size.first, size.second);
+      step.weak_sizes.push_back(sweep.weak == "pixels" ? one + kTimesThreads : one);
+      if (sweep.weak == "pixels") size = size_for_threads(size, threads);
+    }
+  }
+  return steps;
+}
+
 Sweep read_sweep(const toml::table& table, const std::string& file, const std::filesystem::path& folder,
                  const PlanTarget& target) {
   Sweep sweep;
@@ -244,7 +176,18 @@ Sweep read_sweep(const toml::table& table, const std::string& file, const std::f
     sweep.scenes.push_back(relative_to(read_scene(reader, node, file), folder));
     sweep.scenes.back().line = static_cast<std::int64_t>(node.source().begin.line);
   });
-  reader.strings("size", sweep.sizes, [](const std::string& s) { return parse_size(s, "size"); });
+  std::vector<std::string> weak;
+  reader.words("weak", kWeakKinds, "", weak);
+  if (weak.size() > 1) reader.fail(*table.get("weak"), "weak", "must be one word: a sweep grows in one way");
+  sweep.weak = weak.front();
+  reader.strings("size", sweep.sizes,
+                 [&](const std::string& s) { return parse_sweep_size(s, sweep.weak, "size"); });
+  if (sweep.weak.empty())
+    for (const SceneReference& scene : sweep.scenes)
+      if (scene.model.find(kTimesThreads) != std::string::npos)
+        reader.fail(*table.get("scene"), "scene",
+                    fmt::format("'{}' grows with the threads: this [[sweep]] needs weak = \"triangles\"",
+                                scene.model));
   reader.strings("kernel", sweep.kernels, [](const std::string& word) {
     if (word != "all") find_kernel(word);
     return word;
@@ -315,6 +258,11 @@ Sweep read_sweep(const toml::table& table, const std::string& file, const std::f
   if (sweep.fills.empty()) sweep.fills.push_back(FillRule::kClosed);
   if (sweep.nears.empty()) sweep.nears.push_back(NearRule::kClip);
   if (sweep.threads.empty()) sweep.threads = {target.cpus};
+  if (!sweep.weak.empty() && std::find(sweep.threads.begin(), sweep.threads.end(), 1) == sweep.threads.end())
+    reader.fail(table.contains("threads") ? *table.get("threads") : table, "threads",
+                "weak scaling is measured against one thread: 1 is missing");
+  if (sweep.weak == "pixels" && sweep.sizes.empty())
+    reader.fail(table, "size", "is missing: weak = \"pixels\" needs the size for one thread");
   if (sweep.tiles.empty()) sweep.tiles.push_back(64);
   if (sweep.generalities.empty()) sweep.generalities.push_back(Generality::kMinimal);
   if (sweep.isas.empty()) sweep.isas.push_back(target.best);
@@ -348,6 +296,7 @@ Study read_study_file(const std::filesystem::path& path) {
     read_sampling(*node->as_table(), study.file, study.sampling);
   }
   reader.find("sweep");
+  reader.find("hypothesis");
   reader.reject_unknown_keys("a study");
   return study;
 }
@@ -374,13 +323,21 @@ std::vector<Sweep> read_sweeps(const std::filesystem::path& path, const std::str
     }
     if (!sizes.empty()) {
       sweep.sizes.clear();
-      for (const std::string& size : sizes) sweep.sizes.push_back(parse_size(size, "--size"));
+      for (const std::string& size : sizes)
+        sweep.sizes.push_back(parse_sweep_size(size, sweep.weak, "--size"));
     }
     if (sweep.scenes.empty())
       throw InputError(
           {.file = file, .line = static_cast<std::int64_t>(node.source().begin.line), .field = "scene"},
           "is missing from this [[sweep]]");
-    all.push_back(std::move(sweep));
+    try {
+      for (Sweep& step : with_weak_steps(sweep)) all.push_back(std::move(step));
+    } catch (const InputError& error) {
+      if (!scenes.empty() && sweep.weak == "triangles") throw InputError({.field = "--scene"}, error.what());
+      throw InputError(
+          {.file = file, .line = static_cast<std::int64_t>(node.source().begin.line), .field = "weak"},
+          error.what());
+    }
   }
   return all;
 }

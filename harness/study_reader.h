@@ -33,12 +33,16 @@ struct Sweep {
   std::vector<Generality> generalities;
   std::vector<Isa> isas;
   std::vector<Techniques> techniques;
+  std::string weak;                      ///< of kWeakKinds, or empty: what grows with the threads
+  std::vector<std::string> weak_scenes;  ///< of a weak sweep, each of `scenes` as the file writes it
+  std::vector<std::string> weak_sizes;   ///< the same of `sizes`
 };
 
 /// Name, question, seed and [sampling] of a study file, and its text; no points yet.
 Study read_study_file(const std::filesystem::path& file);
 
-/// The [[sweep]] tables of `text`. Scenes and sizes, if not empty, replace those of every sweep.
+/// The [[sweep]] tables of `text`. Scenes and sizes, if not empty, replace those of every sweep. A weak sweep
+/// becomes one for each number of threads, with the scenes and sizes of that.
 std::vector<Sweep> read_sweeps(const std::filesystem::path& file, const std::string& text,
                                const PlanTarget& target, const std::vector<std::string>& scenes,
                                const std::vector<std::string>& sizes);
