@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, Iterator
 
-from . import nodes, severity, statistics, text
+from . import nodes, severity, statistics, text, weak
 from .comparison import Analysis
 from .contexts import leaves
 from .figures.balance import busy
@@ -160,7 +160,8 @@ def _bases(analysis: Analysis) -> Iterator[Warn]:
     timed = analysis.study.timed
     parallel = [r for r in timed if r.config.backend != "serial"]
     no_serial = [r for r in parallel if analysis.serial_base[r.id] is None]
-    no_thread = [r for r in parallel if analysis.thread_base[r.id] is None]
+    weak_bases = weak.bases(analysis)  # of a picture that grows with the threads, that of one
+    no_thread = [r for r in parallel if analysis.thread_base[r.id] is None and r.id not in weak_bases]
     if no_serial:
         yield Warn(severity.NO_BASE, f"no base (a), a serial kernel with equal picture, numeric mode and instruction set, for"
                    f" {_some(no_serial, analysis)}.")

@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Callable, Iterator
 
-from . import nodes, statistics, text, trade_text
+from . import hypotheses, nodes, statistics, text, trade_text
 from .comparison import EXTRA_AXES, Analysis, Group, Panel
 from .figures.balance import imbalance
 from .figures.scaling import curves
@@ -273,6 +273,13 @@ def accuracy_limits(analysis: Analysis) -> Iterator[Finding]:
                       f" accuracy bound against the oracle (numeric {modes}).")
 
 
+def claims(analysis: Analysis) -> Iterator[Finding]:
+    """What the study claimed before it ran: that is its question."""
+    said = hypotheses.summary(analysis)
+    if said is not None:
+        yield Finding("hypotheses", 9.0, said)
+
+
 def trade_off(analysis: Analysis) -> Iterator[Finding]:
     """What accuracy costs, where a study measured it: then it is what the study was made for."""
     said = trade_text.finding(analysis)
@@ -312,7 +319,7 @@ def plain_facts(analysis: Analysis) -> Iterator[Finding]:
 
 
 FINDERS: tuple[Callable[[Analysis], Iterator[Finding]], ...] = (
-    fastest, winners, parallel_gain, scaling, schedules, backends, stage_share, balance, untimed, accuracy_limits, trade_off,
+    fastest, winners, parallel_gain, scaling, schedules, backends, stage_share, balance, untimed, accuracy_limits, trade_off, claims,
     plain_facts)
 
 

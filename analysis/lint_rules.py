@@ -10,7 +10,7 @@ from typing import Any, Iterator
 import numpy as np
 from scipy import stats
 
-from . import checks, lint_figures, severity, statistics, text
+from . import checks, hypotheses, lint_figures, severity, statistics, text, weak
 from .figures.balance import busy
 from .lint import Finding, Folder, Rule
 from .load import Record
@@ -25,11 +25,12 @@ STAGE_ROUNDING = 1e-3  # of a sample, by which its stages may exceed it
 
 def base_case(folder: Folder) -> Iterator[Finding]:
     analysis = folder.analysis
+    weak_bases = weak.bases(analysis)
     for record in folder.study.timed:
         if record.config.backend == "serial":
             continue
         bases = {"(a), a serial kernel with equal picture, numeric mode and instruction set": analysis.serial_base[record.id],
-                 "(b), the same point on one thread": analysis.thread_base[record.id]}
+                 "(b), the same point on one thread": analysis.thread_base[record.id] or weak_bases.get(record.id)}
         for name, base in bases.items():
             if base is None:
                 yield folder.record(record, severity.NO_BASE, f"no base {name}", "add it to the sweep: without it no speedup is shown")
@@ -275,6 +276,21 @@ def bounds(folder: Folder) -> Iterator[Finding]:
                                 " held the picture")
 
 
+def stated_before(folder: Folder) -> Iterator[Finding]:
+    """Hypotheses are those of the journal's start, all of them are judged, and by pairs."""
+    claimed = folder.study.context["study"].get("hypotheses") or []
+    start = next((event for event in folder.journal or () if event["event"] == "start"), None)
+    if start is not None and (start.get("hypotheses") or []) != claimed:
+        yield folder.context("study.hypotheses", GRAVE, "not those that the journal has from before the first sample",
+                             "take context.json from the run: a claim that was made after it is none")
+    for verdict in hypotheses.verdicts(folder.analysis):
+        place = f"study.hypotheses[{verdict.number - 1}]"
+        if not verdict.tested:
+            yield folder.context(place, severity.NOT_TESTED, f"not tested: {verdict.reason}", "say so beside the others, or run what is missing")
+        elif verdict.ratio.note:
+            yield folder.context(place, severity.BASE_CAVEAT, verdict.ratio.note, "sample both sides in the same blocks")
+
+
 def crash(folder: Folder) -> Iterator[Finding]:
     for name in ("records.jsonl", "context.json"):
         if not (folder.directory / name).read_bytes().endswith(b"\n"):
@@ -307,6 +323,7 @@ RULES = (
     Rule("plot-legible", "a figure fits a page and its text can be read", lint_figures.legible, "figures"),
     Rule("plot-grey", "a legend can be told apart without colours", lint_figures.grey, "figures"),
     Rule("plot-current", "a figure was drawn from these records", lint_figures.current, "figures"),
+    Rule("hypotheses", "claims are stated before the first sample, and every one is judged", stated_before),
     Rule("crash", "records and context were written whole", crash),
     Rule("exit", "a failed point makes the exit status non-zero", None, why_not="no file holds the exit status; tests/ has it"),
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -89,6 +90,27 @@ class Record:
 
 
 @dataclass(frozen=True)
+class Hypothesis:
+    """A claim of the study file: time of slower / time of faster is at least 1 + by. Several names stand for the fastest of them."""
+
+    claim: str
+    by: float
+    faster: tuple[str, ...]  # names of points
+    slower: tuple[str, ...]
+    untested: str  # why it could select nothing, or empty
+
+
+@dataclass(frozen=True)
+class WeakSeries:
+    """Pictures that grow with the threads."""
+
+    kind: str  # "triangles" or "pixels": what grows
+    scene: str  # as the study file writes them
+    size: str
+    steps: dict[int, tuple[str, tuple[int, int]]]  # by threads: scene and size of the points
+
+
+@dataclass(frozen=True)
 class Study:
     """A study; its records are of kernels, with those of peers beside them: a peer is shown, never compared as a kernel is."""
 
@@ -98,6 +120,15 @@ class Study:
     peers: list[Record] = field(default_factory=list)
     records_hash: str = ""  # of the bytes of records.jsonl
     raw_context: dict[str, Any] = field(default_factory=dict)  # as context.json has it, without the defaults of _context
+
+    @cached_property
+    def hypotheses(self) -> list[Hypothesis]:
+        """Those that the context has; empty in older studies."""
+        return _hypotheses(self.directory / "context.json", self.context["study"].get("hypotheses"))
+
+    @cached_property
+    def weak(self) -> list[WeakSeries]:
+        return _weak(self.directory / "context.json", self.context["study"].get("weak"))
 
     @property
     def every_record(self) -> list[Record]:
@@ -155,7 +186,9 @@ def load(directory: Path) -> Study:
     context, raw = _context(directory / "context.json")
     records = _records(directory / "records.jsonl")
     digest = hashlib.sha256((directory / "records.jsonl").read_bytes()).hexdigest()[:32]
-    return Study(directory, context, [r for r in records if not r.config.is_peer], [r for r in records if r.config.is_peer], digest, raw)
+    study = Study(directory, context, [r for r in records if not r.config.is_peer], [r for r in records if r.config.is_peer], digest, raw)
+    study.hypotheses, study.weak  # read now, so that what is wrong with them is found first
+    return study
 
 
 def read_text(path: Path, missing: str = "no such file (was the study interrupted? run it again with --resume)") -> str:
@@ -206,6 +239,45 @@ def _context(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
         elif not isinstance(context[key], dict):
             raise InputError(path, "expected an object", None, key)
     return context, raw
+
+
+def _hypotheses(path: Path, value: Any) -> list[Hypothesis]:
+    def names(side: Any) -> bool:
+        return isinstance(side, list) and all(isinstance(name, str) for name in side)
+
+    if value is None:
+        return []
+    if not isinstance(value, list):
+        raise InputError(path, "expected an array", None, "study.hypotheses")
+    found = []
+    for i, one in enumerate(value):
+        right = (isinstance(one, dict) and isinstance(one.get("claim"), str) and is_number(one.get("by")) and one["by"] > -1
+                 and names(one.get("faster")) and names(one.get("slower")) and isinstance(one.get("untested"), (str, type(None)))
+                 and (one.get("untested") or one["faster"] and one["slower"]))
+        if not right:
+            raise InputError(path, f"{one!r} is not what `rasterbench study` writes", None, f"study.hypotheses[{i}]")
+        found.append(Hypothesis(one["claim"], float(one["by"]), tuple(one["faster"]), tuple(one["slower"]), one.get("untested") or ""))
+    return found
+
+
+def _weak(path: Path, value: Any) -> list[WeakSeries]:
+    if value is None:
+        return []
+    if not isinstance(value, list):
+        raise InputError(path, "expected an array", None, "study.weak")
+    found = []
+    for i, one in enumerate(value):
+        try:
+            steps = {step["threads"]: (step["scene"], tuple(step["size"])) for step in one["steps"]}
+            words = [one[key] for key in ("kind", "scene", "size")] + [scene for scene, _ in steps.values()]
+            right = all(isinstance(word, str) for word in words) and all(
+                is_whole(p) and len(size) == 2 and all(map(is_whole, size)) for p, (_, size) in steps.items())
+        except (KeyError, TypeError):
+            right = False
+        if not right:
+            raise InputError(path, f"{one!r} is not what `rasterbench study` writes", None, f"study.weak[{i}]")
+        found.append(WeakSeries(one["kind"], one["scene"], one["size"], steps))
+    return found
 
 
 def _records(path: Path) -> list[Record]:

@@ -12,8 +12,8 @@ import jinja2
 import matplotlib
 from markupsafe import Markup
 
-from . import (__version__, checks, figures, findings, ladder, lint, lost_time, nodes, sidecars, stage_efficiency, statistics, strategy_map, style, tables, text,
-               trade, trade_tables, trade_text, work, writing)
+from . import (__version__, checks, figures, findings, hypotheses, ladder, lint, lost_time, nodes, sidecars, stage_efficiency, statistics, strategy_map, style, tables, text,
+               trade, trade_tables, trade_text, weak, work, writing)
 from .captions import Caption
 from .comparison import Analysis
 from .figures.common import drawn_together
@@ -49,7 +49,7 @@ def write(analysis: Analysis, out: Path | None = None) -> Written:
             kind, suffix = ("image/png", "png") if drawing.raster else ("image/svg+xml", "svg")
             uri = data_uri(kind, made[f"{drawing.name}.{suffix}"])
             sections.setdefault(drawing.section, []).append(Embedded(drawing.name, number, uri, drawing.caption))
-    found = [t for module in (nodes, tables, trade_tables, ladder, strategy_map, work, stage_efficiency, lost_time) for t in module.tables(analysis)]
+    found = [t for module in (hypotheses, nodes, tables, trade_tables, ladder, strategy_map, work, weak, stage_efficiency, lost_time) for t in module.tables(analysis)]
     for table in found:
         if table.section:
             sections.setdefault(table.section, [])  # a section may have tables and no figure
@@ -79,7 +79,8 @@ def render(analysis: Analysis, sections: dict[str, list[Embedded]], found: list[
         rules=rules, rules_summary=lint.summary(rules), merged=lint.merged,
         counts=counts(analysis), run_facts=run_facts(analysis), machine_facts=machine_facts(study.context),
         placed_tables=placed(found, hidden), hidden=len(hidden), section_words={trade.SECTION: trade_text.summary(analysis)},
-        section_tables=by_section(found), sections=list(sections.items()), context=recorded(study.context), cell_class=cell_class,
+        section_tables=by_section(found), claimed=[item for item in sections.items() if item[0] == hypotheses.SECTION],
+        sections=[item for item in sections.items() if item[0] != hypotheses.SECTION], context=recorded(study.context), cell_class=cell_class,
         trade_section=f"\u201c{trade.SECTION}\u201d",
         version=__version__, records=f"{text.count(len(study.every_record), 'record')} in {study.directory.name}/records.jsonl",
         min_launches=statistics.MIN_LAUNCHES)

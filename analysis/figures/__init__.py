@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Iterator
 
 from ..comparison import Analysis
-from . import (balance, ladder, lost_time, numerics, pareto, scaling, scenes, schedules, stage_efficiency, stages, strategy_map, times,
-               work)
+from . import (balance, hypotheses, imbalance, ladder, lost_time, numerics, pareto, scaling, scenes, schedules, stage_efficiency, stages, strategy_map, times,
+               weak, work)
 from .common import Drawing
 
-MODULES = (scenes, pareto, strategy_map, work, times, ladder, numerics, scaling, schedules, stages, stage_efficiency, lost_time, balance)
+MODULES = (hypotheses, scenes, pareto, strategy_map, work, times, ladder, numerics, scaling, weak, schedules, stages, stage_efficiency, lost_time, balance, imbalance)
 
 
 def draw(analysis: Analysis) -> Iterator[Drawing]:

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from .. import style, text
+from .. import style, text, weak
 from ..captions import Caption
 from ..comparison import Analysis, Group, strategy
 from ..load import Record
@@ -236,8 +236,8 @@ def families(analysis: Analysis) -> list[list[Group]]:
 
 
 def drawn_together(analysis: Analysis, group: Group) -> bool:
-    """Whether a group is too small for figures of its own and is shown beside its other numeric modes instead."""
-    return len(group.timed) < SMALL and any(group in groups for groups in families(analysis))
+    """Whether a group is too small for figures of its own and is shown beside its other numeric modes, or in weak scaling, instead."""
+    return len(group.timed) < SMALL and (any(group in groups for groups in families(analysis)) or weak.shows(analysis, group))
 
 
 def bounds(points: list[Point]) -> tuple[float, float]:
