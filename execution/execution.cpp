@@ -46,9 +46,29 @@ std::string to_string(const ExecutionConfig& config) {
 Execution::Execution(const ExecutionConfig& config)
     : config_(config),
       stamped_(std::getenv("RASTERBENCH_NO_STAMPS") == nullptr),
-      tally_(static_cast<std::size_t>(config.threads)) {}
+      tally_(static_cast<std::size_t>(config.threads)),
+      sightings_(static_cast<std::size_t>(config.threads)) {}
 
 void Execution::reset_tally() { std::fill(tally_.begin(), tally_.end(), WorkerTally{}); }
+
+void Execution::reset_sightings() {
+  for (Sightings& sightings : sightings_) {
+    sightings.first = sightings.last = -1;
+    sightings.moves = 0;
+    sightings.cpus.clear();  // keeps its memory: the next sighting lies in a timed frame
+  }
+}
+
+void Sightings::look() {
+  const int cpu = sched_getcpu();  // a load from the thread's restartable-sequence area: about 2 ns
+  if (cpu == last) return;
+  if (first < 0)
+    first = cpu;
+  else
+    ++moves;
+  last = cpu;
+  if (std::find(cpus.begin(), cpus.end(), cpu) == cpus.end()) cpus.push_back(cpu);
+}
 
 double Execution::now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();

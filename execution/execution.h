@@ -42,6 +42,18 @@ struct alignas(64) WorkerTally {
   int cpu = -1;             ///< where it ran last
 };
 
+/// The CPUs on which one worker was seen, at the begin and the end of the loops since the last reset. Padded:
+/// each worker writes its own.
+struct alignas(64) Sightings {
+  int first = -1;          ///< CPU of the first sighting; -1: never seen
+  int last = -1;           ///< and of the last one
+  std::int64_t moves = 0;  ///< times that it was seen on another CPU than the time before
+  std::vector<int> cpus;   ///< each CPU once, in the order of their first sightings
+
+  /// Notes the CPU that the calling thread runs on. Allocates only where the thread has moved.
+  void look();
+};
+
 /// Runs loops. One object belongs to one point: what a runtime learns in one frame (an affinity) never
 /// reaches another.
 class Execution {
@@ -64,10 +76,16 @@ class Execution {
   std::span<const WorkerTally> tally() const { return tally_; }
   void reset_tally();
 
+  /// Where each worker was seen. Apart from the tally, which a frame resets before its raster stage: a sample
+  /// may have many frames, and all of their loops.
+  std::span<const Sightings> sightings() const { return sightings_; }
+  void reset_sightings();
+
  protected:
   /// Seconds of a monotonic clock.
   static double now();
   WorkerTally& tally_of(int worker) { return tally_[static_cast<std::size_t>(worker)]; }
+  Sightings& sightings_of(int worker) { return sightings_[static_cast<std::size_t>(worker)]; }
   /// Whether loops are stamped and counted: always, but where RASTERBENCH_NO_STAMPS is set in the environment
   /// to measure what that costs. Tallies then stay empty.
   bool is_stamped() const { return stamped_; }
@@ -76,6 +94,7 @@ class Execution {
   ExecutionConfig config_;
   bool stamped_;
   std::vector<WorkerTally> tally_;
+  std::vector<Sightings> sightings_;
 };
 
 /// Which threads really run: measured by a loop whose iterations wait for each other.

@@ -1,6 +1,5 @@
 // OpenMP worksharing loops: schedule(static | dynamic | guided | auto), chosen at run time.
 #include <omp.h>
-#include <sched.h>
 
 #include <algorithm>
 
@@ -28,6 +27,8 @@ class OpenMp final : public Execution {
       const int worker = omp_get_thread_num();
       if (is_stamped()) {
         const double begin = now();
+        Sightings& sightings = sightings_of(worker);
+        sightings.look();
         std::int64_t iterations = 0, runs = 0, next = -1;
 #pragma omp for schedule(runtime) nowait
         for (std::int64_t i = 0; i < n; ++i) {
@@ -40,7 +41,8 @@ class OpenMp final : public Execution {
         tally.busy_seconds += now() - begin;
         tally.iterations += iterations;
         tally.chunks += chunks_of(iterations, runs, kind, chunk);
-        tally.cpu = sched_getcpu();
+        sightings.look();
+        tally.cpu = sightings.last;
       } else {
 #pragma omp for schedule(runtime) nowait
         for (std::int64_t i = 0; i < n; ++i) body(i, worker);

@@ -1,6 +1,4 @@
 // Serial: one thread, iterations in order. The base of every speedup.
-#include <sched.h>
-
 #include "execution/execution.h"
 
 namespace rasterbench {
@@ -12,13 +10,15 @@ class Serial final : public Execution {
 
   void loop(std::int64_t n, LoopBody body) override {
     const double begin = is_stamped() ? now() : 0;
+    if (is_stamped()) sightings_of(0).look();
     for (std::int64_t i = 0; i < n; ++i) body(i, 0);
     if (!is_stamped()) return;
     WorkerTally& tally = tally_of(0);
     tally.busy_seconds += now() - begin;
     tally.iterations += n;
     tally.chunks += n > 0;
-    tally.cpu = sched_getcpu();
+    sightings_of(0).look();
+    tally.cpu = sightings_of(0).last;
   }
 
   void uniform_loop(std::int64_t n, LoopBody body) override { loop(n, body); }

@@ -4,10 +4,12 @@
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/partitioner.h>
 #include <oneapi/tbb/task_arena.h>
+#include <oneapi/tbb/task_scheduler_observer.h>
 #include <sched.h>
 
 #include <algorithm>
 
+#include "execution/binding.h"
 #include "execution/execution.h"
 #include "execution/loop_trace.h"
 
@@ -15,6 +17,37 @@ namespace rasterbench {
 namespace {
 
 using Range = oneapi::tbb::blocked_range<std::int64_t>;
+
+/// Binds every thread that comes into an arena as OpenMP would bind the thread of its number. oneTBB has no
+/// binding of its own finer than a NUMA node, and its workers inherit the mask of the thread that starts
+/// them, which OMP_PROC_BIND has narrowed to one place: unbound, all of them would share it.
+class Binder final : public oneapi::tbb::task_scheduler_observer {
+ public:
+  Binder(oneapi::tbb::task_arena& arena, int threads) : task_scheduler_observer(arena) {
+    for (const std::vector<int>& cpus : bound_cpus(threads)) {
+      cpu_set_t& mask = masks_.emplace_back();
+      CPU_ZERO(&mask);
+      for (const int cpu : cpus) CPU_SET(static_cast<std::size_t>(cpu), &mask);
+    }
+    if (!masks_.empty()) observe(true);
+  }
+  ~Binder() override { observe(false); }
+  Binder(const Binder&) = delete;
+  Binder& operator=(const Binder&) = delete;
+
+  void on_scheduler_entry(bool) override {
+    const auto slot = static_cast<std::size_t>(oneapi::tbb::this_task_arena::current_thread_index());
+    if (slot >= masks_.size()) return;
+    // A worker comes and goes with each loop, mostly into the slot that it had: no system call then.
+    thread_local cpu_set_t bound{};
+    if (CPU_EQUAL(&bound, &masks_[slot])) return;
+    // What it refuses shows: a study looks where its threads run.
+    if (sched_setaffinity(0, sizeof bound, &masks_[slot]) == 0) bound = masks_[slot];
+  }
+
+ private:
+  std::vector<cpu_set_t> masks_;  // by slot; empty: no binding
+};
 
 template <class Partitioner>
 class Tbb final : public Execution {
@@ -25,6 +58,7 @@ class Tbb final : public Execution {
         parallelism_(oneapi::tbb::global_control::max_allowed_parallelism,
                      static_cast<std::size_t>(std::max(config.threads, available_cpus()))),
         arena_(config.threads),
+        binder_(arena_, config.threads),
         stamps_(static_cast<std::size_t>(config.threads)) {}
 
   void loop(std::int64_t n, LoopBody body) override {
@@ -62,7 +96,7 @@ class Tbb final : public Execution {
       if (stamp.epoch != epoch_) {
         const double begin = now();
         stamp = {.epoch = epoch_, .ranges = 0, .stamped_ranges = 0, .first = begin, .last = begin};
-        tally.cpu = sched_getcpu();
+        sightings_of(worker).look();
       }
       for (std::int64_t i = range.begin(); i != range.end(); ++i) body(i, worker);
       tally.iterations += static_cast<std::int64_t>(range.size());
@@ -70,6 +104,8 @@ class Tbb final : public Execution {
       const bool are_short =
           stamp.last - stamp.first < kShortRange * static_cast<double>(stamp.stamped_ranges);
       if (++stamp.ranges > 16 && are_short && stamp.ranges % 16 != 0) return;
+      sightings_of(worker).look();
+      tally.cpu = sightings_of(worker).last;
       const double end = now();
       tally.busy_seconds += end - stamp.last;
       stamp.last = end;
@@ -80,6 +116,7 @@ class Tbb final : public Execution {
 
   oneapi::tbb::global_control parallelism_;
   oneapi::tbb::task_arena arena_;
+  Binder binder_;
   // Lives as long as the point: affinity learns over its frames, and over no others.
   Partitioner partitioner_;
   std::vector<Stamp> stamps_;

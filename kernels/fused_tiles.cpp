@@ -115,6 +115,7 @@ class FusedTiles final : public Renderer {
 
   std::span<const std::uint32_t> colours() const override { return colours_.span(); }
   std::span<const float> depths() const override { return depths_.span(); }
+  Execution* execution() override { return execution_.get(); }
 
   std::vector<std::int32_t> ids() const override {
     if (ids_.size() != settings_.pixels()) throw std::logic_error("fused_tiles was not asked to keep ids");

@@ -135,6 +135,9 @@ class Renderer {
 
   /// Bytes of all buffers of the point.
   virtual std::size_t bytes() const = 0;
+
+  /// What runs its loops; null where another program draws.
+  virtual Execution* execution() { return nullptr; }
 };
 
 /// What a renderer is made of. The scene must outlive it.

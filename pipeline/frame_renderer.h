@@ -172,6 +172,7 @@ class FrameRenderer final : public Renderer {
 
   std::span<const std::uint32_t> colours() const override { return colours_.span(); }
   std::span<const float> depths() const override { return depths_.span(); }
+  Execution* execution() override { return execution_.get(); }
 
   std::vector<std::int32_t> ids() const override {
     std::vector<std::int32_t> ids(keys_.size(), -1);
