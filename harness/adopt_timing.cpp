@@ -1,17 +1,14 @@
 #include <fmt/format.h>
-#include <sys/resource.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <fstream>
-#include <numeric>
 #include <random>
 #include <regex>
 
 #include "harness/adopt.h"
 #include "harness/statistics.h"
+#include "machine/cpu_times.h"
 
 namespace rasterbench {
 namespace {
@@ -35,27 +32,6 @@ std::vector<double> scaled(const std::vector<double>& values, double factor) {
   std::vector<double> result;
   for (const double value : values) result.push_back(value * factor);
   return result;
-}
-
-/// CPU seconds that the whole machine has been busy since it started (proc(5), /proc/stat), stolen ones
-/// included.
-std::optional<double> machine_seconds() {
-  std::ifstream file("/proc/stat");
-  std::string word;
-  double user = 0, nice = 0, system = 0, idle = 0, iowait = 0, irq = 0, softirq = 0, steal = 0;
-  if (!(file >> word >> user >> nice >> system >> idle >> iowait >> irq >> softirq >> steal))
-    return std::nullopt;
-  return (user + nice + system + irq + softirq + steal) / static_cast<double>(sysconf(_SC_CLK_TCK));
-}
-
-/// CPU seconds of this process.
-double own_seconds() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval& time) {
-    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
-  };
-  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
 Json point_json(const TimedPoint& point, const TimedPoint* base) {
@@ -96,8 +72,8 @@ std::optional<Json> time_program(const AdoptOptions& options, const std::vector<
   const std::regex own_time(options.own_time);
   std::mt19937_64 random(1);
   const auto begin = std::chrono::steady_clock::now();
-  const std::optional<double> machine_before = machine_seconds();
-  const double own_before = own_seconds();
+  const std::optional<CpuTimes> machine_before = read_cpu_times();
+  const double own_before = own_cpu_seconds();
   std::vector<std::uint32_t> pixels;
   std::string stop;
   for (int block = 0; stop.empty(); ++block) {
@@ -141,14 +117,15 @@ std::optional<Json> time_program(const AdoptOptions& options, const std::vector<
       {"target", options.target},
       {"stop", stop},
       {"own_time", options.own_time.empty() ? Json() : Json(options.own_time)}};
-  double programs = 0;
-  for (const TimedPoint& point : points)
-    programs += std::accumulate(point.cpu_seconds.begin(), point.cpu_seconds.end(), 0.0);
   const double elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  const std::optional<double> machine_after = machine_seconds();
+  // Here stolen time counts as others': the machine gave it to them. The programs are children that were
+  // waited for.
+  const auto taken_by_all = [](const CpuTimes& times) { return times.busy + times.stolen; };
+  const std::optional<CpuTimes> machine_after = read_cpu_times();
   timing["other_load_cpus"] =
       machine_before && machine_after
-          ? Json(std::max(0.0, *machine_after - *machine_before - (own_seconds() - own_before) - programs) /
+          ? Json(std::max(0.0, taken_by_all(*machine_after) - taken_by_all(*machine_before) -
+                                   (own_cpu_seconds() - own_before)) /
                  elapsed)
           : Json("unavailable: /proc/stat cannot be read");
   for (const TimedPoint& point : points) {
