@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Iterator, Sequence
 
-# Results of a run, not conditions of it. The load average moves from minute to minute; the report warns of a high one.
-MEASURED = ("id", "started", "finished", "points", "images", "limits.rates", "machine.load_average")
+# Results of a run, not conditions of it. Load and noise move from minute to minute; the report warns of them.
+MEASURED = ("id", "started", "finished", "points", "images", "limits.rates", "machine.load_average", "noise")
 ABSENT = "not recorded"
 
 

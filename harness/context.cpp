@@ -15,6 +15,7 @@
 #include "base/hash.h"
 #include "build_info.h"
 #include "harness/hypothesis.h"
+#include "machine/topology.h"
 
 extern char** environ;
 
@@ -74,6 +75,13 @@ Json describe_machine() {
     machine["cores"] = "unavailable: hwloc cannot read the topology";
   }
   if (topology) hwloc_topology_destroy(topology);
+  machine["topology"] = Json::array();
+  for (const CpuPlace& place : cpu_places())
+    machine["topology"].push_back({{"cpu", place.cpu},
+                                   {"core", place.core},
+                                   {"package", place.package},
+                                   {"numa_node", place.numa_node}});
+  if (machine["topology"].empty()) machine["topology"] = "unavailable: hwloc cannot read the topology";
   machine["memory_bytes"] = std::int64_t{sysconf(_SC_PHYS_PAGES)} * sysconf(_SC_PAGE_SIZE);
   machine["governor"] = first_line("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor");
   machine["load_average"] = first_line("/proc/loadavg");

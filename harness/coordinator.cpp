@@ -13,6 +13,7 @@
 #include "harness/folder_lock.h"
 #include "harness/google_benchmark.h"
 #include "harness/limits.h"
+#include "harness/noise.h"
 #include "harness/process.h"
 #include "harness/progress.h"
 #include "harness/run.h"
@@ -62,6 +63,7 @@ class Coordinator {
     context["limits"] = limits_.to_json();
     draw_images(context);
     sample_points();
+    watch_noise(last_block_, true);
     return finish(context);
   }
 
@@ -281,6 +283,7 @@ class Coordinator {
     for (const PointState& state : states_)
       for (const Sample& sample : state.samples) block = std::max(block, sample.block);
     double block_seconds = 0;
+    noise_.begin(block, cpu_seconds());
     for (;; ++block) {
       std::vector<PointState*> order = next_block();
       const auto is_taken = [block](const PointState* state) {
@@ -295,6 +298,7 @@ class Coordinator {
       Random random(study_.seed * 1000003 + static_cast<std::uint64_t>(block));
       for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random.bits() % i]);
       const auto block_begin = Clock::now();
+      last_block_ = block;
       for (PointState* state : order) {
         if (block > 0 && out_of_time())
           return;  // the first block is taken whole; --resume with more time goes on
@@ -303,7 +307,22 @@ class Coordinator {
       }
       block_seconds = std::chrono::duration<double>(Clock::now() - block_begin).count();
       close_points();
+      watch_noise(block, false);
     }
+  }
+
+  /// CPU seconds of this program's processes.
+  double cpu_seconds() const {
+    double seconds = own_cpu_seconds();
+    for (const auto& [slot, processes] : runners_)
+      for (const auto& [environment, process] : processes)
+        if (process) seconds += process->cpu_seconds();  // null: it could not be started
+    return seconds;
+  }
+
+  void watch_noise(int block, bool is_last) {
+    if (const std::optional<Json> event = noise_.end_of_block(block, cpu_seconds(), is_last))
+      journal_->append(*event);
   }
 
   void take_sample(PointState& state, int block) {
@@ -328,6 +347,11 @@ class Coordinator {
         return record_event(
             {{"event", "fail"},
              {"reason", fmt::format("{} of {} threads ran", observed, point.execution.threads)}},
+            state);
+      if (const std::string binding = answer.value("binding", "kept"); binding != "kept")
+        return record_event(
+            {{"event", "fail"},
+             {"reason", fmt::format("binding {} was not kept: {}", point.environment.binding, binding)}},
             state);
       if (answer.at("picture") != state.judgement.at("picture"))
         return record_event({{"event", "fail"}, {"reason", "a timed frame differs from the verified one"}},
@@ -371,17 +395,20 @@ class Coordinator {
       ++(skip ? skipped : ok ? run : failed);
     }
     context["points"] = {{"planned", states_.size()}, {"run", run}, {"skipped", skipped}, {"failed", failed}};
+    const std::vector<Json> events = read_journal(options_.out / "journal.jsonl");
+    context["noise"] = summarise_noise(events, has_unbound_threads());
     const std::string id = hash_bytes(dump(context));
     Json whole;
     whole["schema"] = context.at("schema");
     whole["id"] = id;
-    whole["started"] = read_journal(options_.out / "journal.jsonl").front().at("at");
+    whole["started"] = events.front().at("at");
     whole["finished"] = utc_now();
     whole.update(context);
     std::string lines;
     std::vector<Json> records;
+    const Topology topology(cpu_places());
     for (const PointState& state : states_) {
-      records.push_back(make_record(state, study_, limits_.floor_of(limit_of(state, study_)), id));
+      records.push_back(make_record(state, study_, limits_.floor_of(limit_of(state, study_)), topology, id));
       lines += dump(records.back()) + "\n";
     }
     try {
@@ -400,7 +427,16 @@ class Coordinator {
       fmt::print("{}", google_benchmark_report(records, options_.benchmark_format, options_.custom_context));
     fmt::print(stderr, "{} planned, {} run, {} skipped, {} failed; records in {}\n", states_.size(), run,
                skipped, failed, (options_.out / "records.jsonl").string());
+    if (const std::string warning = noise_warning(context["noise"]); !warning.empty())
+      fmt::print(stderr, "{}\n", warning);
     return failed == 0 ? 0 : 1;
+  }
+
+  bool has_unbound_threads() const {
+    return std::any_of(states_.begin(), states_.end(), [](const PointState& state) {
+      const Point& point = state.planned->point;
+      return state.timed() && point.execution.threads > 1 && point.environment.binding == "none";
+    });
   }
 
   const Study& study_;
@@ -413,6 +449,8 @@ class Coordinator {
   std::map<Environment, std::unique_ptr<Process>> verifiers_;
   std::map<int, std::map<Environment, std::unique_ptr<Process>>> runners_;  // by slot
   Process* running_ = nullptr;
+  NoiseWatch noise_;
+  int last_block_ = 0;
   std::map<int, int>
       launch_of_;  // by slot: a launch is a process, so a restarted one has a number of its own
   int next_launch_ = 0;

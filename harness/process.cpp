@@ -11,6 +11,7 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
+#include <ctime>
 
 extern char** environ;
 
@@ -136,6 +137,13 @@ Json Process::ask(const Json& request, double timeout_seconds) {
   }
   if (answer.contains("error")) throw ProcessError(answer.at("error").get<std::string>());
   return answer;
+}
+
+double Process::cpu_seconds() const {
+  clockid_t clock{};
+  timespec used{};
+  if (!alive() || clock_getcpuclockid(pid_, &clock) != 0 || clock_gettime(clock, &used) != 0) return 0;
+  return static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec);
 }
 
 void Process::pause() {

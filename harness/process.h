@@ -47,6 +47,10 @@ class Process {
   void pause();
   void resume();
 
+  /// CPU seconds that the child has used so far; 0 when it is dead: it then counts with the children of this
+  /// process.
+  double cpu_seconds() const;
+
   bool alive() const { return pid_ > 0; }
 
  private:

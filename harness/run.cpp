@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/hash.h"
 #include "harness/hypothesis.h"
+#include "harness/placement.h"
 #include "harness/statistics.h"
 
 namespace rasterbench {
@@ -33,7 +34,9 @@ Json per_thread(const PointState& state) {
                        {"idle_ms", median_of("idle_ms")},
                        {"iterations", last.at(worker).at("iterations")},
                        {"chunks", last.at(worker).at("chunks")},
-                       {"cpu", last.at(worker).at("cpu")}});
+                       {"cpu", last.at(worker).at("cpu")},
+                       {"cpus", samples_by_cpu(state, worker)},
+                       {"migrations", migrations_of(state, worker)}});
   }
   return threads;
 }
@@ -134,7 +137,7 @@ void apply_event(const Json& event, PointState& state) {
 }
 
 Json make_record(const PointState& state, const Study& study, std::optional<double> floor_ms,
-                 const std::string& context_id) {
+                 const Topology& topology, const std::string& context_id) {
   const Point& point = state.planned->point;
   Json record;
   record["schema"] = 1;
@@ -182,6 +185,7 @@ Json make_record(const PointState& state, const Study& study, std::optional<doub
   record["threads_observed"] =
       state.judgement.is_null() ? Json() : state.judgement.value("threads_observed", Json());
   record["per_thread"] = ok ? per_thread(state) : Json::array();
+  record["placement"] = ok ? placement_of(state, topology) : Json();
   if (ok && state.samples.back().answer.contains("counters"))
     record["counters"] = state.samples.back().answer.at("counters");
   record["context"] = context_id;

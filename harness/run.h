@@ -9,6 +9,7 @@
 
 #include "harness/journal.h"
 #include "harness/study.h"
+#include "machine/topology.h"
 
 namespace rasterbench {
 
@@ -55,9 +56,9 @@ void replay(const std::vector<Json>& events, const Json& start, const std::files
 /// Applies one event to the state that it names; the same code for a running study and a replayed one.
 void apply_event(const Json& event, PointState& state);
 
-/// One line of records.jsonl. `floor_ms` is that of the point, if it has one.
+/// One line of records.jsonl. `floor_ms` is that of the point, if it has one; `topology` is the machine's.
 Json make_record(const PointState& state, const Study& study, std::optional<double> floor_ms,
-                 const std::string& context_id);
+                 const Topology& topology, const std::string& context_id);
 
 /// Why a point is sampled no more ("target", "max_samples", "point_seconds"), or empty. `times_ms` are its
 /// samples, `spent_ms` its time in timed frames. Precondition: at least one sample.

@@ -33,7 +33,9 @@ class RunTest : public testing::Test {
               {"threads_observed", 1}}}};
   }
   Json sample(int block, double ms) {
-    const Json thread{{"busy_ms", ms / 2}, {"idle_ms", ms / 4}, {"iterations", 4}, {"chunks", 2}, {"cpu", 0}};
+    const Json thread{{"busy_ms", ms / 2}, {"idle_ms", ms / 4}, {"iterations", 4}, {"chunks", 2},
+                      {"cpu", 0},          {"first_cpu", 0},    {"last_cpu", 0},   {"cpus", Json::array({0})},
+                      {"moves", 0}};
     return {{"event", "sample"},
             {"id", states_[0].id},
             {"block", block},
@@ -53,7 +55,7 @@ TEST_F(RunTest, RecordHoldsTheSamples) {
   apply_event(verify(), states_[0]);
   for (int i = 0; i < 7; ++i) apply_event(sample(i, 10 - i), states_[0]);
   apply_event({{"event", "stop"}, {"reason", "target"}}, states_[0]);
-  const Json record = make_record(states_[0], study_, 1.5, "context");
+  const Json record = make_record(states_[0], study_, 1.5, Topology({}), "context");
   EXPECT_EQ(record.at("status"), "ok");
   EXPECT_EQ(record.at("samples_ms").size(), 7u);
   EXPECT_EQ(record.at("median_ms"), 7.0);
@@ -65,6 +67,9 @@ TEST_F(RunTest, RecordHoldsTheSamples) {
   EXPECT_EQ(record.at("per_thread").at(0).at("busy_ms"), 3.5);
   EXPECT_EQ(record.at("per_thread").at(0).at("idle_ms"), 1.75);
   EXPECT_EQ(record.at("per_thread").at(0).at("chunks"), 2);
+  EXPECT_EQ(record.at("per_thread").at(0).at("cpus"), (Json{{"0", 7}}));
+  EXPECT_EQ(record.at("per_thread").at(0).at("migrations"), 0);
+  EXPECT_EQ(record.at("placement").at("cpus"), 1);
   EXPECT_EQ(record.at("id").get<std::string>().size(), 32u);
 }
 
@@ -72,7 +77,7 @@ TEST_F(RunTest, FailureHidesTheSpeed) {
   apply_event(verify(), states_[0]);
   apply_event(sample(0, 1), states_[0]);
   apply_event({{"event", "fail"}, {"reason", "died"}}, states_[0]);
-  const Json record = make_record(states_[0], study_, 1.5, "context");
+  const Json record = make_record(states_[0], study_, 1.5, Topology({}), "context");
   EXPECT_EQ(record.at("status"), "failed");
   EXPECT_EQ(record.at("reason"), "died");
   EXPECT_TRUE(record.at("samples_ms").empty());
@@ -82,7 +87,7 @@ TEST_F(RunTest, FailureHidesTheSpeed) {
 }
 
 TEST_F(RunTest, SkippedPointsSayWhy) {
-  const Json record = make_record(states_[1], study_, 1.5, "context");
+  const Json record = make_record(states_[1], study_, 1.5, Topology({}), "context");
   EXPECT_EQ(record.at("status"), "skipped");
   EXPECT_EQ(record.at("reason"), "no reason");
 }
@@ -115,8 +120,8 @@ TEST_F(RunTest, IdDependsOnSceneAndBuild) {
 TEST_F(RunTest, GoogleBenchmarkReportHasEverySample) {
   apply_event(verify(), states_[0]);
   for (int i = 0; i < 3; ++i) apply_event(sample(i, i + 1), states_[0]);
-  const std::vector<Json> records{make_record(states_[0], study_, {}, "c"),
-                                  make_record(states_[1], study_, {}, "c")};
+  const std::vector<Json> records{make_record(states_[0], study_, {}, Topology({}), "c"),
+                                  make_record(states_[1], study_, {}, Topology({}), "c")};
   const Json report = Json::parse(google_benchmark_report(records, "json", {}));
   const Json& runs = report.at("benchmarks");
   ASSERT_EQ(runs.size(), 7u);  // three samples, mean, median, stddev, one error

@@ -9,6 +9,7 @@
 #include <iostream>
 
 #include "base/error.h"
+#include "execution/binding.h"
 #include "harness/explain_point.h"
 #include "harness/limits.h"
 #include "harness/verdict_json.h"
@@ -100,6 +101,7 @@ class Runner {
     if (!probe) answer["threads_observed"] = observed_llvmpipe_threads();  // its first frame starts them
     if (probe && point.cache == "cold") sweep_caches(*probe);
 
+    if (Execution* execution = renderer->execution()) execution->reset_sightings();
     StageSeconds stages;
     const FrameReport* report = nullptr;  // of the last frame; read after the clock has stopped
     benchmark::ClearRegisteredBenchmarks();
@@ -134,13 +136,25 @@ class Runner {
                         {"raster", stage_ms(stages.raster)},
                         {"resolve", stage_ms(stages.resolve)}};
     Json& threads = answer["per_thread"] = Json::array();
-    for (const WorkerTally& worker : report->raster_tally)
+    for (std::size_t i = 0; i < report->raster_tally.size(); ++i) {
+      const WorkerTally& worker = report->raster_tally[i];
+      const Sightings& seen = renderer->execution()->sightings()[i];
       threads.push_back(
           {{"busy_ms", worker.busy_seconds * 1e3},
            {"idle_ms", std::max(0.0, 1e3 * (report->seconds.raster.value_or(0) - worker.busy_seconds))},
            {"iterations", worker.iterations},
            {"chunks", worker.chunks},
-           {"cpu", worker.cpu}});
+           {"cpu", worker.cpu},
+           {"first_cpu", seen.first},
+           {"last_cpu", seen.last},
+           {"cpus", seen.cpus},
+           {"moves", seen.moves}});
+    }
+    // A serial loop runs on the initial thread, which a runtime may leave unbound until its first team.
+    if (point.environment.binding != "none" && probe && point.execution.backend != "serial") {
+      const std::string broken = broken_binding(renderer->execution()->sightings(), binding_);
+      answer["binding"] = broken.empty() ? "kept" : broken;
+    }
     answer["picture"] = picture_hash(*renderer);
     for (const auto& [counter, value] : reporter.last.counters) answer["counters"][counter] = value.value;
     return answer;
@@ -154,6 +168,7 @@ class Runner {
   }
 
   Verifier verifier_;
+  const Binding binding_ = process_binding();
   std::map<std::string, Scene> scenes_;
 };
 

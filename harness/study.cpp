@@ -34,8 +34,9 @@ std::string reason_to_skip(const Point& point, const Scene& scene, const Samplin
   if (is_left_out(point.execution.backend))
     return fmt::format("this build has no backend {}", point.execution.backend);
   if (too_many_threads) return too_many;
-  if (point.execution.backend == "tbb" && point.environment != Environment{})
-    return "binding, wait policy and runtime are OpenMP's; OMP_PROC_BIND would narrow oneTBB to one worker";
+  if (point.execution.backend == "tbb" &&
+      (point.environment.wait_policy != "default" || point.environment.runtime != "default"))
+    return "wait policy and runtime are OpenMP's: oneTBB has neither";
   if (!is_supported(point.isa)) return fmt::format("this CPU has no {}", to_string(point.isa));
   if (!find_mode(point.numeric)->has_screen_triangles) {
     try {

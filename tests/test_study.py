@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import re
 import statistics
+import subprocess
+import sys
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -84,7 +86,10 @@ CONFIG = {"scene": TEXT, "scene_hash": TEXT, "size": LIST, "kernel": TEXT, "nume
 RECORD = {"schema": WHOLE, "id": TEXT, "name": TEXT, "config": dict, "status": TEXT, "launches": LIST, "blocks": LIST, "frames_per_sample": WHOLE,
           "samples_ms": LIST, "stages_ms": dict, "median_ms": (*NUMBER, NULL), "interval_ms": (LIST, NULL), "p95_ms": (*NUMBER, NULL),
           "min_ms": (*NUMBER, NULL), "max_ms": (*NUMBER, NULL), "floor_ms": (*NUMBER, NULL), "stop": (TEXT, NULL), "verify": (dict, NULL), "work": (dict, NULL), "hardware": (dict, NULL),
-          "threads_observed": (WHOLE, NULL), "per_thread": LIST, "context": TEXT}
+          "threads_observed": (WHOLE, NULL), "per_thread": LIST, "placement": (dict, NULL), "context": TEXT}
+PLACEMENT = {"binding": (TEXT, NULL)} | dict.fromkeys(["migrations", "cpus", "cores", "packages", "numa_nodes", "samples_sharing_cpu", "samples_sharing_core"], WHOLE)
+NOISE = {"windows": WHOLE, "seconds": NUMBER, "other_load_cpus": (dict, TEXT), "steal_share": (dict, TEXT), "load_average": (dict, TEXT),
+         "frequency_mhz": (dict, TEXT), "throttled": (*NUMBER, TEXT), "warnings": LIST, "remarks": LIST}
 VERIFY = {"conforms": bool, "checked_against": TEXT, "differing_pixels": WHOLE, "oracle": (dict, NULL), "end_to_end": dict, "embree": dict, "embree_robust": dict,
           "bound": dict}
 ORACLE = {"renderer": TEXT, "within_bound": bool, "seconds": NUMBER} | dict.fromkeys(
@@ -105,9 +110,9 @@ EVENTS = ["cycles", "instructions", "branches", "branch_misses", "l1d_read_misse
           "context_switches", "page_faults"]
 REJECTED = dict.fromkeys(["non_finite", "zero_area", "behind_near", "beyond_far", "off_screen", "back_facing"], WHOLE)
 CONTEXT = {"schema": WHOLE, "id": TEXT, "started": TEXT, "finished": TEXT, "program": dict, "libraries": dict, "machine": dict,
-           "environment": dict, "study": dict, "region": TEXT, "scenes": dict, "overrides": dict, "custom": dict, "points": dict, "images": dict, "limits": dict}
+           "environment": dict, "study": dict, "region": TEXT, "scenes": dict, "overrides": dict, "custom": dict, "points": dict, "images": dict, "limits": dict, "noise": dict}
 MACHINE = {"hostname": TEXT, "cpu": TEXT, "cpus_online": WHOLE, "cpus_allowed": LIST, "cores": WHOLE, "packages": WHOLE, "numa_nodes": WHOLE,
-           "smt": bool, "caches": LIST, "memory_bytes": WHOLE, "governor": TEXT, "load_average": TEXT, "kernel": TEXT, "virtualisation": TEXT}
+           "smt": bool, "caches": LIST, "topology": LIST, "memory_bytes": WHOLE, "governor": TEXT, "load_average": TEXT, "kernel": TEXT, "virtualisation": TEXT}
 
 
 def obey(value: dict[str, Any], schema: dict[str, Any], what: str, optional: tuple[str, ...] = ()) -> None:
@@ -238,7 +243,7 @@ def test_good_points_are_verified(study: Study) -> None:
         assert w["drawn"] + sum(w["rejected"].values()) == w["triangles"]
         assert r["threads_observed"] == r["config"]["threads"] == len(r["per_thread"])
         for worker in r["per_thread"]:
-            assert set(worker) == {"busy_ms", "idle_ms", "iterations", "chunks", "cpu"}
+            assert set(worker) == {"busy_ms", "idle_ms", "iterations", "chunks", "cpu", "cpus", "migrations"}
             assert min(worker["busy_ms"], worker["idle_ms"]) >= 0 and 0 <= worker["chunks"] <= worker["iterations"]
 
 
@@ -336,7 +341,6 @@ def test_null_kernel_is_hidden(good: Study, tmp_path: Path) -> None:
     ({"kernel": "triangle_atomics", "numeric": "f64", "fill": "closed"}, ["triangle_atomics", "f64"]),
     ({"kernel": "all_pixels"}, ["predicted cost", " s ", "time limit of 5 s"]),
     ({"threads": CPUS + 1}, [f"{CPUS + 1} threads on {CPUS} CPUs", "--oversubscribe"]),
-    ({"backend": "tbb", "binding": "close"}, ["oneTBB"]),
     ({"backend": "tbb", "wait_policy": "passive"}, ["OpenMP"]),
     ({"backend": "tbb", "runtime": "libomp"}, ["OpenMP"]),
 ], ids=lambda value: " ".join(map(str, value.values())) if isinstance(value, dict) else "")
@@ -349,8 +353,11 @@ def test_skipped_with_a_reason(axes: dict[str, Any], words: list[str], mixed: St
                                   {"near": "off", "tile": 16}, {"near": "off", "tile": 32}, {"cache": "cold"}, {"generality": "full"}, {"threads": 1, "kernel": "row_parallel",
                                   "binding": "none", "wait_policy": "default", "runtime": "default"}], ids=str)
 def test_axes_that_run(axes: dict[str, Any], mixed: Study) -> None:
-    (r,) = [r for r in mixed.where(**axes) if r["config"]["backend"] != "tbb"]
+    found = mixed.where(**axes)
+    (r,) = [r for r in found if r["config"]["backend"] != "tbb"]
     assert r["status"] == "ok", r.get("reason")
+    if "binding" in axes:  # the one axis of these that oneTBB has, too
+        assert [r["status"] for r in found] == ["ok"] * len(found)
 
 
 @pytest.mark.skipif(ISAS == ["baseline"], reason="streaming needs vectors")
@@ -384,6 +391,135 @@ def test_oversubscribed(tmp_path: Path) -> None:
     study = Study(tmp_path, sampling(), sweep("row_parallel", ["openmp:static", "tbb:auto"], threads=CPUS + 1), options=("--oversubscribe",))
     assert study.outcome.code == 0
     assert [r["threads_observed"] for r in study.records] == [CPUS + 1] * 2
+
+
+# Where threads run.
+
+def places_of_cores(context: dict[str, Any]) -> list[set[int]]:
+    """The allowed CPUs of each core, in the order of the cores."""
+    allowed, cores = set(context["machine"]["cpus_allowed"]), {}
+    for place in context["machine"]["topology"]:
+        if place["cpu"] in allowed:
+            cores.setdefault(place["core"], set()).add(place["cpu"])
+    return [cores[core] for core in sorted(cores)]
+
+
+def test_topology_has_every_allowed_cpu(good: Study) -> None:
+    machine = good.context["machine"]
+    assert set(machine["cpus_allowed"]) <= {place["cpu"] for place in machine["topology"]}
+    assert all(set(place) == {"cpu", "core", "package", "numa_node"} for place in machine["topology"])
+    assert len({place["core"] for place in machine["topology"]}) == machine["cores"]
+
+
+def test_every_sample_says_where_its_threads_were(study: Study) -> None:
+    allowed = set(study.context["machine"]["cpus_allowed"])
+    for r in study.records:
+        if r["status"] != "ok":
+            assert r["placement"] is None
+            continue
+        obey(r["placement"], PLACEMENT, r["name"])
+        seen: set[int] = set()
+        for thread in r["per_thread"]:
+            cpus = set(map(int, thread["cpus"]))
+            assert cpus <= allowed and all(1 <= n <= len(r["samples_ms"]) for n in thread["cpus"].values())
+            assert thread["migrations"] >= len(cpus) - len(set(r["launches"]))  # a launch begins anywhere
+            seen |= cpus
+        assert r["placement"]["cpus"] == len(seen)
+        assert r["placement"]["migrations"] == sum(thread["migrations"] for thread in r["per_thread"])
+        assert r["placement"]["samples_sharing_cpu"] <= r["placement"]["samples_sharing_core"] <= len(r["samples_ms"])
+        bound = r["config"]["binding"] != "none" and r["config"]["backend"] != "serial"
+        assert r["placement"]["binding"] == ("kept" if bound else None)
+
+
+@needs_two_cpus
+@pytest.mark.parametrize("binding", ["close", "spread"])
+def test_bound_threads_stay_in_their_places(tmp_path: Path, binding: str) -> None:
+    """Under OpenMP as under oneTBB, whose binding is this program's own."""
+    study = Study(tmp_path, sampling(8, launches=2), sweep("row_parallel", ["openmp:dynamic", "tbb:auto", "tbb:affinity"], threads=2, binding=binding))
+    places = places_of_cores(study.context)
+    expected = [0, 1 if binding == "close" else len(places) // 2] if len(places) > 1 else [0, 0]
+    assert [r["status"] for r in study.records] == ["ok"] * 3, [r.get("reason") for r in study.records]
+    for r in study.records:
+        assert r["placement"]["binding"] == "kept" and r["threads_observed"] == 2
+        for place, thread in zip(expected, r["per_thread"]):
+            if thread["cpus"]:  # a worker of oneTBB that came too late for every loop was never seen
+                assert set(map(int, thread["cpus"])) <= places[place]
+        if len(places) > 1:
+            assert r["placement"]["samples_sharing_core"] == 0
+
+
+@needs_two_cpus
+def test_a_binding_that_is_not_kept_fails(tmp_path: Path) -> None:
+    """Threads that are told to bind and are moved on by somebody else: a library that frees them again."""
+    source, library = tmp_path / "free.c", tmp_path / "free.so"
+    source.write_text("""#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <sched.h>
+#include <unistd.h>
+/* Every look moves the thread to the other CPU: 0, 1, 0, ... */
+int sched_getcpu(void) { static __thread int looks; return looks++ % 2; }
+""")
+    compiled = subprocess.run(["cc", "-shared", "-fPIC", "-o", library, source], capture_output=True)
+    if compiled.returncode != 0:
+        pytest.skip("no C compiler")
+    study = Study(tmp_path, sampling(), sweep("row_parallel", ["serial", "openmp:static"], threads=1, binding=["none", "close"]), LD_PRELOAD=str(library))
+    places = places_of_cores(study.context)
+    if any({0, 1} <= place for place in places):
+        pytest.skip("CPUs 0 and 1 are one core")
+    assert study.outcome.code == 1
+    broken = study.the(backend="openmp", binding="close")
+    assert broken["status"] == "failed" and "binding close was not kept: thread 0" in broken["reason"] and broken["placement"] is None
+    free = study.the(backend="openmp", binding="none")
+    assert free["status"] == "ok" and free["placement"]["binding"] is None and free["placement"]["migrations"] > 10
+
+
+def test_two_threads_on_one_cpu_are_labelled(tmp_path: Path) -> None:
+    study = Study(tmp_path, sampling(), sweep("row_parallel", "openmp:static", threads=CPUS + 1), options=("--oversubscribe",))
+    (r,) = study.records
+    assert r["placement"]["samples_sharing_cpu"] == len(r["samples_ms"])
+
+
+# Noise.
+
+def test_noise_is_watched(study: Study) -> None:
+    noise = study.context["noise"]
+    obey(noise, NOISE, "noise")
+    windows = events(study.folder, "noise")
+    assert noise["windows"] == len(windows) >= 1
+    assert noise["seconds"] == pytest.approx(sum(w["seconds"] for w in windows))
+    blocks = max(b for r in study.records for b in r["blocks"])
+    spans = [w["blocks"] for w in windows]
+    assert spans[0][0] == 0 and spans[-1][1] <= blocks and all(a[1] + 1 == b[0] for a, b in zip(spans, spans[1:]))
+    for key in ("other_load_cpus", "steal_share", "load_average"):
+        values = [w[key] for w in windows]
+        assert noise[key]["median"] == pytest.approx(statistics.median(values)) and noise[key]["worst"] == max(values)
+    assert all(0 <= w["steal_share"] <= 1 and 0 <= w["other_load_cpus"] for w in windows)
+    said = [line for line in study.outcome.errors if line.startswith("noisy machine: ")]
+    assert len(said) == bool(noise["warnings"]) and all(warning in said[0] for warning in noise["warnings"])
+
+
+@needs_two_cpus
+def test_other_load_is_seen_and_ones_own_is_not(tmp_path: Path) -> None:
+    """Beside a program that spins; and beside none, where this machine allows to tell."""
+    for name in ("quiet", "loud"):
+        (tmp_path / name).mkdir()
+    quiet = Study(tmp_path / "quiet", sampling(400), sweep("row_parallel", "openmp:static", threads=1, size="400x300"), options=("--time-limit", 2))
+    other = subprocess.Popen([sys.executable, "-c", "while True: pass"])
+    try:
+        loud = Study(tmp_path / "loud", sampling(400), sweep("row_parallel", "openmp:static", threads=1, size="400x300"), options=("--time-limit", 2))
+    finally:
+        other.kill()
+        other.wait()
+    noise = loud.context["noise"]
+    assert noise["other_load_cpus"]["median"] > 0.3 and any("other programs kept" in warning for warning in noise["warnings"])
+    assert any(line.startswith("noisy machine: other programs kept") for line in loud.outcome.errors)
+    # The study alone keeps a CPU busy: were it counted, this would be above 0.8 on a machine without any other load.
+    if quiet.context["noise"]["load_average"]["worst"] < 0.5:
+        assert quiet.context["noise"]["other_load_cpus"]["median"] < 0.3
+
+
+def test_unbound_threads_are_a_remark(good: Study) -> None:
+    assert len(good.context["noise"]["remarks"]) == (CPUS > 1)
 
 
 def test_launches_alternate(tmp_path: Path) -> None:

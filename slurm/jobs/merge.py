@@ -60,7 +60,7 @@ def merged_context(manifest: Manifest, parts: Sequence[State], images: dict[str,
     contexts = [part.result.context or {} for part in parts]
     names = type_names(context["machine"] for context in contexts)
     context = json.loads(json.dumps(contexts[0]))
-    for key in ("id", "limits", "images"):
+    for key in ("id", "limits", "images", "noise"):
         context.pop(key, None)
     context["started"] = min(c["started"] for c in contexts)
     context["finished"] = max(c["finished"] for c in contexts)
@@ -82,8 +82,12 @@ def merged_context(manifest: Manifest, parts: Sequence[State], images: dict[str,
         key: sum(record["status"] == status for record in records)
         for key, status in (("run", "ok"), ("skipped", "skipped"), ("failed", "failed"))}
     context["parts"] = [{"family": part.family.id, "shard": part.family.shard, "context": c["id"],
-                         "node_type": names[type_key(c["machine"])], "provenance": part.result.provenance}
+                         "node_type": names[type_key(c["machine"])], "provenance": part.result.provenance, "noise": c.get("noise")}
                         for part, c in zip(parts, contexts)]
+    noises = [(part["node_type"], part["noise"]) for part in context["parts"] if isinstance(part["noise"], dict)]
+    if noises:
+        context["noise"] = {"warnings": list(dict.fromkeys(f"{node}: {words}" for node, noise in noises for words in noise["warnings"])),
+                            "remarks": list(dict.fromkeys(words for _, noise in noises for words in noise["remarks"]))}
     digest = hashlib.sha256(json.dumps(context, sort_keys=True).encode()).hexdigest()[:32]
     return {"schema": context.pop("schema"), "id": digest, **context}
 
