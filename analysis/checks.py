@@ -46,7 +46,7 @@ def unhashed(study: Study) -> list[Record]:
 
 def check(analysis: Analysis) -> list[Warn]:
     """The grave ones first."""
-    found = [warn for rule in (_launches, _samples, _stops, _provenance, _nodes, _jobs, _load, _bases, _pinning, _threads, _floors,
+    found = [warn for rule in (_launches, _samples, _stops, _provenance, _nodes, _jobs, _load, _noise, _bases, _pinning, _placement, _steadiness, _threads, _floors,
                                _families, _agreement, _images) for warn in rule(analysis)]
     return sorted(found, key=lambda warn: warn.grade != GRAVE)
 
@@ -154,6 +154,56 @@ def _load(analysis: Analysis) -> Iterator[Warn]:
     cpus = cpus if isinstance(cpus, int) and cpus > 0 else 1
     if load is not None and load > 0.25 * cpus:
         yield Warn(severity.BUSY_MACHINE, f"load average {load:g} on {text.count(cpus, 'CPU')} at the start: something else was running.")
+
+
+def watched_noise(study: Study) -> dict[str, Any] | None:
+    """What the study saw of other load between its blocks; None where it did not look."""
+    noise = study.context.get("noise")
+    return noise if isinstance(noise, dict) else None
+
+
+def _noise(analysis: Analysis) -> Iterator[Warn]:
+    for warning in (watched_noise(analysis.study) or {}).get("warnings", ()):
+        yield Warn(severity.BUSY_MACHINE, f"noisy machine while sampling: {warning}.")
+
+
+def placement(record: Record) -> dict[str, Any] | None:
+    """Where the threads of a point were seen; None where nobody looked."""
+    found = record.raw.get("placement")
+    return found if isinstance(found, dict) else None
+
+
+def sharing(study: Study, record: Record) -> str:
+    """In how many samples two threads were seen on one core, where there are cores for all of them; else empty: more threads
+    than cores must share."""
+    seen = placement(record) or {}
+    samples, cores = seen.get("samples_sharing_core"), study.context["machine"].get("cores")
+    if not _is_count(samples) or not samples or (_is_count(cores) and record.config.threads > cores):
+        return ""
+    return f"{samples} of {text.count(record.samples.n, 'sample')}"
+
+
+def _placement(analysis: Analysis) -> Iterator[Warn]:
+    timed = analysis.study.timed
+    shared = [r for r in timed if sharing(analysis.study, r)]
+    if shared:
+        yield Warn(severity.SHARED_CORE, f"two threads were seen on one core in {_some(shared, analysis)}, though there are cores for all (first:"
+                   f" {analysis.label(shared[0])}, in {sharing(analysis.study, shared[0])}).")
+    broken = [r for r in timed if (placement(r) or {}).get("binding") not in (None, "kept")]
+    if broken:
+        yield Warn(severity.BINDING_BROKEN, f"the binding was not kept in {_some(broken, analysis)}.")
+
+
+def _steadiness(analysis: Analysis) -> Iterator[Warn]:
+    found = [(r, analysis.steadiness[r.id]) for r in analysis.study.timed]
+    drifting = [s.drift for _, s in found if s.drift is not None]
+    if drifting:
+        yield Warn(severity.NOT_STEADY, f"times drifted in {_some([r for r, s in found if s.drift is not None], analysis)}, by up to"
+                   f" {100 * max(drifting, key=abs):+.1f} % over the run: trust ratios of samples of one block, not single times.")
+    outlying = [r for r, s in found if s.outliers]
+    if outlying:
+        yield Warn(severity.NOT_STEADY, f"outliers in {_some(outlying, analysis)}, all kept: the largest is"
+                   f" {max(s.largest for _, s in found):.3g} times its median.")
 
 
 def _bases(analysis: Analysis) -> Iterator[Warn]:

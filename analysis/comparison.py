@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Collection
 
-from . import nodes, statistics, text
+from . import nodes, statistics, steadiness, text
 from .load import Config, Record, Study
 from .statistics import Comparison, Estimate
+from .steadiness import Steadiness
 
 # Two points are compared only if these are equal: same picture, same arithmetic, same region, same cache state.
 GROUP_AXES = ("scene", "scene_hash", "size", "numeric", "fill", "near", "output", "cache")
@@ -222,6 +223,12 @@ class Analysis:
         if key not in self._ratios:
             self._ratios[key] = statistics.ratio(base.samples, record.samples)
         return self._ratios[key]
+
+    @cached_property
+    def steadiness(self) -> dict[str, Steadiness]:
+        """Drift and outliers of every timed point, peers included."""
+        timed = [record for record in self.study.every_record if record.ok]
+        return dict(zip((r.id for r in timed), steadiness.judge([r.samples for r in timed], self.study.target)))
 
     @cached_property
     def panels(self) -> list[Panel]:

@@ -17,9 +17,7 @@ from .load import Record
 from .severity import GRAVE, NOTE
 from .statistics import is_close, is_number
 
-DRIFT_P = 1e-3  # of Spearman's rank correlation between time and order
 ORDER_P = 1e-3  # of as many identical orders by chance
-OUTLIER = 3.0  # times the median
 STAGE_ROUNDING = 1e-3  # of a sample, by which its stages may exceed it
 
 
@@ -223,6 +221,15 @@ def set_up(folder: Folder) -> Iterator[Finding]:
                                 "remove what limits them (binding, cgroup), or ask for fewer")
         if record.config.threads > 1 and str(record.config.binding or "none").lower() in ("none", "false", "off"):
             yield folder.record(record, severity.NOT_PINNED, "its threads were not pinned", "add binding = [\"close\"] to the study")
+        if record.config.is_peer:
+            continue  # its threads are its own
+        placement = checks.placement(record)
+        if placement is None:
+            yield folder.record(record, severity.NOT_WATCHED, "where its threads ran was not observed", "run the study again: each sample looks")
+        elif placement.get("binding") not in (None, "kept"):
+            yield folder.record(record, severity.BINDING_BROKEN, f"its binding was not kept: {placement['binding']}", "such a point has failed")
+        elif shared := checks.sharing(folder.study, record):
+            yield folder.record(record, severity.SHARED_CORE, f"two of its threads were on one core in {shared}", "bind them, or ask for fewer threads than cores")
         times = busy(record)
         if times and min(times) < 0.01 * max(times):
             yield folder.record(record, severity.IDLE_THREAD, "a thread did next to nothing", "read its time as that of fewer threads")
@@ -235,20 +242,19 @@ def noise(folder: Folder) -> Iterator[Finding]:
         yield folder.context("machine.load_average", GRAVE, "not recorded", "record it, or \"unavailable: REASON\"")
     elif load is not None and load > 0.25 * (cpus if isinstance(cpus, int) and cpus > 0 else 1):
         yield folder.context("machine.load_average", severity.BUSY_MACHINE, f"{load:g} at the start: something else was running", "run on a quiet machine")
+    watched = checks.watched_noise(folder.study)
+    if watched is None:
+        yield folder.context("noise", severity.NOT_WATCHED, "not recorded", "run the study again: other load, steal and frequency are read between blocks")
+    for warning in (watched or {}).get("warnings", ()):
+        yield folder.context("noise", severity.BUSY_MACHINE, str(warning), "run on a quiet machine, with bound threads")
     for record in folder.timed:
-        values, target = record.samples.values, folder.study.target
-        slow = int(np.sum(values > OUTLIER * np.median(values)))
-        if slow:
-            yield folder.record(record, NOTE, f"{text.count(slow, 'sample')} above {OUTLIER:g} times the median (kept)",
+        found = folder.analysis.steadiness[record.id]
+        if found.outliers:
+            yield folder.record(record, severity.NOT_STEADY, f"{text.count(found.outliers, 'outlier')}, up to {found.largest:.3g} times the median (kept)",
                                 "look at p95 and the largest time; find what disturbed them")
-        if len(values) >= 10 and np.ptp(values) > 0:
-            trend = stats.spearmanr(np.arange(len(values)), values)
-            half = len(values) // 2
-            moved = float(np.median(values[-half:]) / np.median(values[:half])) - 1
-            # Only a shift that matters: a rank correlation finds any.
-            if trend.pvalue < DRIFT_P and abs(moved) > target:
-                yield folder.record(record, NOTE, f"its later samples differ by {100 * moved:+.1f} % from its earlier ones: drift",
-                                    "trust paired ratios, not single times; let the machine settle")
+        if found.drift is not None:
+            yield folder.record(record, severity.NOT_STEADY, f"its times changed by {100 * found.drift:+.1f} % over the run: drift",
+                                "trust paired ratios, not single times; let the machine settle")
 
 
 def verification(folder: Folder) -> Iterator[Finding]:
@@ -312,8 +318,8 @@ RULES = (
     Rule("blocks", "every point once a block", blocks),
     Rule("order", "randomised blocks", order, "journal"),
     Rule("clock", "the timed region is named, and its parts fit into it", clock),
-    Rule("set-up", "machine, build and observed threads are recorded", set_up),
-    Rule("noise", "load, drift and outliers are labelled", noise),
+    Rule("set-up", "machine, build and where the threads ran are recorded", set_up),
+    Rule("noise", "load, steal, frequency, drift and outliers are labelled", noise),
     Rule("verification", "says what it was checked against", verification),
     Rule("verified-first", "checked before it was timed", verified_first, "journal"),
     Rule("bounds", "the measured floor stands beside the times", bounds),

@@ -6,7 +6,7 @@ import base64
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Callable
 
 import jinja2
 import matplotlib
@@ -157,8 +157,29 @@ def run_facts(analysis: Analysis) -> list[tuple[str, str]]:
         facts += [("samples a point", text.span([r.samples.n for r in timed])),
                   ("launches a point", ", ".join(map(str, launches))),
                   ("stopped by", ", ".join(f"{name} ({many})" for name, many in stops.items()))]
+    facts += noise_facts(context)
     facts += [(f"custom: {key}", said(value)) for key, value in context["custom"].items()]
     return facts
+
+
+def noise_facts(context: dict[str, Any]) -> list[tuple[str, str]]:
+    """What the study saw of the machine between its blocks."""
+    noise = context.get("noise")
+    if not isinstance(noise, dict):
+        return [("noise while sampling", "not recorded")]
+
+    def spread(key: str, say: Callable[[float], str]) -> str:
+        value = noise.get(key)
+        if not isinstance(value, dict) or not all(statistics.is_number(value.get(k)) for k in ("median", "worst")):
+            return said(value)
+        return f"{say(value['median'])} in the median, {say(value['worst'])} at worst"
+
+    facts = [("CPUs that others kept busy", spread("other_load_cpus", text.number)), ("CPU time stolen", spread("steal_share", text.percent)),
+             ("load average while sampling", spread("load_average", text.number)), ("frequency of the fastest CPU, MHz", said(noise.get("frequency_mhz"))),
+             ("throttled", said(noise.get("throttled")))]
+    facts = [(name, words) for name, words in facts if words != "not recorded"]  # merged studies have their parts' in parts
+    remarks = noise.get("remarks")
+    return facts + ([("remarks on noise", said(remarks))] if remarks else [])
 
 
 def machine_facts(context: dict[str, Any]) -> list[tuple[str, str]]:

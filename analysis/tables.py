@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from . import latex, statistics, text
+from . import checks, latex, statistics, steadiness, text
 from .comparison import GROUP_AXES, Analysis, Group, strategy
 from .load import Record
 from .statistics import Comparison, Estimate
@@ -109,6 +109,7 @@ def points(analysis: Analysis, group: Group) -> Table:
             + "; base (b): the same point on one thread, with its seconds."
             + (" A peer is another program, with an arithmetic and a fill rule of its own: it has no speedup and is no base."
                if group.peers else "")
+            + (f" {steadiness.RULE}" if any(analysis.steadiness[r.id].words for r in group.timed) else "")
             + (" x floor: times the time in which the point's bytes pass at the measured rate." if any(
                 r.floor_ms is not None for r in group.timed) else ""))
     return Table(f"points_{group.slug}", f"Strategy and execution, {group.title}", note,
@@ -141,6 +142,9 @@ def _measured(analysis: Analysis, record: Record, comparison: Comparison) -> dic
     row: dict[str, Any] = columns("median_ms", analysis.estimates[record.id])
     row |= {"n": record.samples.n, "launches": record.samples.launch_count, "interval": analysis.estimates[record.id].kind,
             "stop": record.stop, "accuracy": accuracy(record)}
+    steady, where = analysis.steadiness[record.id], checks.placement(record) or {}
+    row |= {"drift": steady.drift, "drift_p_holm": steady.p_holm, "outliers": steady.outliers,
+            **{key: where.get(key) for key in ("migrations", "samples_sharing_core")}}
     row |= columns("time_over_fastest", comparison.ratio if comparison.verdict != "best" else None)
     row |= {"verdict": VERDICTS[comparison.verdict], "test": comparison.test, "p_holm": comparison.p_holm,
             "superiority": comparison.superiority}
@@ -169,6 +173,7 @@ def _said(analysis: Analysis, record: Record, comparison: Comparison) -> dict[st
         "median ms [95 %]": times(analysis.estimates[record.id]), "n": str(record.samples.n), "stop": record.stop or text.MISSING,
         "verdict": f"conforms; {accuracy(record)}",
         **({"x floor": text.number(floor)} if floor is not None else {}),
+        **({"unsteady": words} if (words := analysis.steadiness[record.id].words) else {}),
         "time / fastest": "fastest" if comparison.verdict == "best"
         else times(comparison.ratio) + ("" if comparison.verdict == "slower" else " ≈"),
         "speedup (a)": "is base (a)" if is_base else times(over),

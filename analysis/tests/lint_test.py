@@ -151,6 +151,9 @@ def first(change):
     ("set-up", "note", first(lambda r: r["config"].update(binding="none")), ("base-case",)),
     ("set-up", "note", first(lambda r: r["per_thread"][1].update(busy_ms=0.0)), ()),
     ("set-up", "note", first(lambda r: r.update(threads_observed=None)), ()),
+    ("set-up", "note", first(lambda r: r.pop("placement")), ()),
+    ("set-up", "note", first(lambda r: r["placement"].update(samples_sharing_core=3)), ()),
+    ("set-up", "grave", first(lambda r: r["placement"].update(binding="thread 1 left its place")), ()),
     ("noise", "note", first(outlier), ()),
     ("noise", "note", first(drift), ("stopping",)),
     ("verification", "grave", first(lambda r: r["verify"].pop("checked_against")), ()),
@@ -202,6 +205,8 @@ def test_a_base_that_was_sampled_on_after_its_target(tmp_path):
     ("set-up", "grave", lambda c: c["machine"].update(governor="")),
     ("noise", "grave", lambda c: c["machine"].pop("load_average")),
     ("noise", "note", lambda c: c["machine"].update(load_average=[3.5, 1, 1])),
+    ("noise", "note", lambda c: c.pop("noise")),
+    ("noise", "note", lambda c: c["noise"].update(warnings=["other programs kept 0.5 CPUs busy"])),
 ])
 def test_contexts(tmp_path, rule, severity, change):
     directory = write(tmp_path / "a")

@@ -103,7 +103,9 @@ def record(p: Plan, config: dict[str, Any], rng: np.random.Generator, drift: np.
             "non_finite": 0, "zero_area": 100, "behind_near": 0, "beyond_far": 0, "off_screen": 200, "back_facing": 0},
             "near_clipped": 0, "guard_clipped": 0, "covered_pixels": w * h // 3, "bytes": 12 * w * h},
         "threads_observed": config["threads"],
-        "per_thread": [{"busy_ms": b, "iterations": 100, "cpu": i} for i, b in enumerate(busy)], "context": context}
+        "per_thread": [{"busy_ms": b, "iterations": 100, "cpu": i, "cpus": {str(i): n}, "migrations": 0} for i, b in enumerate(busy)],
+        "placement": {"binding": None if config["backend"] == "serial" else "kept", "migrations": 0, "cpus": config["threads"], "cores": config["threads"],
+                      "packages": 1, "numa_nodes": 1, "samples_sharing_cpu": 0, "samples_sharing_core": 0}, "context": context}
 
 
 def statistics_stages() -> tuple[str, ...]:
@@ -138,6 +140,9 @@ def context(p: Plan, records: list[dict[str, Any]]) -> dict[str, Any]:
                     "governor": "unavailable: no cpufreq in this VM", "load_average": [0.1, 0.2, 0.3], "kernel": "6.1.0",
                     "virtualisation": "kvm"},
         "environment": {"OMP_PROC_BIND": "close"},
+        "noise": {"windows": 30, "seconds": 60.0, "other_load_cpus": {"median": 0.03, "worst": 0.2, "worst_blocks": [4, 4]},
+                  "steal_share": {"median": 0.0, "worst": 0.001, "worst_blocks": [2, 2]}, "load_average": {"median": 2.1, "worst": 2.4, "worst_blocks": [9, 9]},
+                  "frequency_mhz": "unavailable: no cpufreq in this VM", "throttled": 0, "warnings": [], "remarks": []},
         "study": {"name": "synthetic", "question": "Which strategy & schedule is fastest?", "file": "studies/synthetic.toml",
                   "text": "[study]\nname = \"synthetic\" # <b>not html</b>\n", "hash": "ab12", "seed": 1, "shard": "1/1",
                   "sampling": {"target": 0.02, "min_samples": 6, "max_samples": 30, "point_seconds": 2, "launches": p.launches,
