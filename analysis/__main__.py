@@ -50,10 +50,12 @@ def parser() -> Parser:
                                             " the floor it takes, with 95 %% intervals, and whether that is the goal of its class"
                                             " (studies/speed.toml). Writes DIR/speed.csv and DIR/speed.tex.")
     lint = commands.add_parser("lint", help="say which rules of measuring a study and its figures keep or break",
-                               description="Names each rule, whether the folder keeps it, what breaks it (file, point) and what to do."
-                                           " Exit codes: 0 nothing forbids publishing, 1 a rule is broken, 2 bad input.")
+                               description="Names each rule, whether the folder keeps it, what breaks it (file, point) and what to do. In a"
+                                           " folder without a study the rules of figures are asked of what adopt, whatif, trace, stability or"
+                                           " compare drew. Exit codes: 0 nothing forbids publishing, 1 a rule is broken, 2 bad input.")
     lint.add_argument("--json", action="store_true", help="print JSON, with every finding")
-    for command in (report, table, speed, lint):
+    lint.add_argument("directory", metavar="DIR", type=Path, help="folder of a study (see harness/records.md), or of figures")
+    for command in (report, table, speed):
         command.add_argument("directory", metavar="DIR", type=Path,
                              help="folder of a study, with context.json and records.jsonl (see harness/records.md)")
     compare = commands.add_parser("compare", help="compare two runs, point by point",
@@ -158,6 +160,12 @@ def main(arguments: list[str] | None = None) -> int:
             print(made.text)
             print(f"written: {', '.join(map(str, made.paths))}")
             return 0
+        if options.command == "lint":
+            from . import lint
+
+            result = lint.lint_directory(options.directory)
+            print(lint.as_json(result) if options.json else lint.plain(result))
+            return result.status
         study = load(options.directory)
         # Imported late: a wrong path should not wait for matplotlib.
         from .comparison import Analysis
@@ -167,12 +175,6 @@ def main(arguments: list[str] | None = None) -> int:
 
             print(tables.plain(Analysis(study)))
             return 0
-        if options.command == "lint":
-            from . import lint
-
-            result = lint.lint(Analysis(study))
-            print(lint.as_json(result) if options.json else lint.plain(result))
-            return result.status
         if options.command == "speed":
             from . import speed
 

@@ -15,7 +15,7 @@ import matplotlib
 import numpy as np
 import pandas as pd
 
-from . import load, statistics, style, text, writing
+from . import load, sidecars, statistics, style, text, writing
 from .load import InputError
 from .statistics import Comparison, Estimate, Samples, is_number
 from .tables import VERDICTS, Table, columns, times
@@ -181,7 +181,7 @@ def write(directory: Path) -> str:
     figures: dict[str, str | bytes] = {}
     with matplotlib.rc_context(style.RC):
         for drawn in drawing.draw(adoption):
-            figures |= {f"{drawn.name}.{kind}": content for kind, content in style.outputs(drawn.figure).items()}
+            figures |= sidecars.files(drawn, *sidecars.drawn_from(directory / "adopt.json", directory / "figures"))
             figures[f"{drawn.name}.txt"] = f"{drawn.caption.plain}\n{drawn.caption.reading}\n"
     writing.write_folder(directory / "figures", figures, "adopt")
     writing.write_folder(directory / "tables", {"adopt.csv": made.csv(), "adopt.tex": made.tex()}, "adopt")

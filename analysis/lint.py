@@ -7,6 +7,7 @@ One rule, one id, one function that finds what breaks it. A rule that a folder c
 from __future__ import annotations
 
 import json
+import os
 from collections import Counter
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
@@ -19,6 +20,8 @@ from .load import InputError, Record
 from .severity import GRAVE
 
 PICTURES = (".png", ".svg")
+FIGURE_PLACES = ("*.json", "figures/*.json", "*/*.json", "*/figures/*.json")
+STUDY_FILES = ("context.json", "records.jsonl")
 KEPT, BROKEN, NOTED, NOT_VISIBLE = "kept", "broken", "kept, with notes", "not visible"
 
 
@@ -36,7 +39,7 @@ class Rule:
     id: str
     text: str
     check: Callable[[Folder], Iterator[Finding]] | None  # None: no file of a study shows it
-    needs: str = ""  # "journal" or "figures": without them it is not visible
+    needs: str = ""  # "journal" or "figures" (all others need a study): without them it is not visible
     why_not: str = ""
 
 
@@ -68,12 +71,20 @@ class Result:
 
 
 class Folder:
-    """The files of a study, read once."""
+    """The files of a study, read once; or a folder that has figures only."""
 
-    def __init__(self, analysis: Analysis) -> None:
-        self.analysis = analysis
-        self.study = analysis.study
-        self.directory = analysis.study.directory
+    def __init__(self, analysis: Analysis | None, directory: Path) -> None:
+        self.found = analysis
+        self.directory = directory
+
+    @property
+    def analysis(self) -> Analysis:
+        assert self.found is not None, "rules that need a study are not asked without one"
+        return self.found
+
+    @property
+    def study(self) -> load.Study:
+        return self.analysis.study
 
     @property
     def timed(self) -> list[Record]:
@@ -91,22 +102,31 @@ class Folder:
 
     @cached_property
     def figures(self) -> list[tuple[str, dict[str, Any]]]:
-        """File and content of what lies beside each figure."""
-        folder = self.directory / "figures"
+        """File and content of what lies beside each figure: in figures/, in the folder itself, and in those one below it, where
+        others of the programs here may have drawn (whatif, trace, compare)."""
         found = []
-        for path in sorted(folder.glob("*.json")) if folder.is_dir() else ():
-            if any(path.with_suffix(kind).is_file() for kind in PICTURES):  # others' JSON is no figure's
-                found.append((f"figures/{path.name}", sidecars.read(path)))
+        for path in sorted({path for pattern in FIGURE_PLACES for path in self.directory.glob(pattern)}):
+            if not any(path.with_suffix(kind).is_file() for kind in PICTURES):
+                continue  # others' JSON is no figure's
+            # Elsewhere than in figures/ data may lie beside a picture of its name: a trace and its heat map.
+            if path.parent.name == "figures" or sidecars.is_one(path):
+                found.append((str(path.relative_to(self.directory)), sidecars.read(path)))
         return found
+
+    def source(self, file: str, figure: dict[str, Any]) -> Path | None:
+        """What a figure was drawn from; None where that is not said, or not here."""
+        said = figure.get("source", sidecars.RECORDS if file.startswith("figures/") else "")
+        path = Path(os.path.normpath((self.directory / file).parent / said))  # figures/ need not be there before a report is written
+        return path if said and path.is_file() else None
 
     @cached_property
     def undescribed(self) -> list[str]:
-        """Pictures in figures/ that nothing beside them describes."""
-        folder = self.directory / "figures"
+        """Pictures in figures/ that nothing beside them describes; elsewhere there are pictures that are no figures."""
+        inner = "" if self.directory.resolve().name == "figures" else "figures/"
         described = {file for file, _ in self.figures}
-        pictures = sorted(path for kind in PICTURES for path in folder.glob(f"*{kind}"))
-        alone = [path for path in pictures if f"figures/{path.stem}.json" not in described]
-        return [f"figures/{path.name}" for path in {path.stem: path for path in reversed(alone)}.values()]  # one a name
+        pictures = sorted(path for kind in PICTURES for path in self.directory.glob(f"{inner}*{kind}"))
+        alone = [path for path in pictures if f"{inner}{path.stem}.json" not in described]
+        return [f"{inner}{path.name}" for path in {path.stem: path for path in reversed(alone)}.values()]  # one a name
 
     def record(self, record: Record, severity: str, problem: str, remedy: str) -> Finding:
         return Finding(severity, f"records.jsonl:{record.line}", record.name, problem, remedy)
@@ -130,16 +150,33 @@ def _event(event: dict[str, Any], path: Path, line: int) -> dict[str, Any]:
 
 def lint(analysis: Analysis, figures: dict[str, bytes] | None = None) -> Result:
     """figures: what a report is about to write into figures/; without it the files that are there are read."""
-    from .lint_rules import RULES
-
-    folder = Folder(analysis)
+    folder = Folder(analysis, analysis.study.directory)
     if figures is not None:
         folder.undescribed = []  # report.py removes what it no longer draws
         folder.figures = [(f"figures/{name}", json.loads(content)) for name, content in sorted(figures.items()) if name.endswith(".json")]
+    return _judge(folder)
+
+
+def lint_directory(directory: Path) -> Result:
+    """The folder of a study; or one without a study, with the figures of adopt, whatif, trace, stability or compare. Throws
+    InputError where there is neither."""
+    if not directory.is_dir() or any((directory / name).exists() for name in STUDY_FILES):
+        return lint(Analysis(load.load(directory)))
+    folder = Folder(None, directory)
+    if not folder.figures and not folder.undescribed:
+        raise InputError(directory, "holds neither a study (context.json, records.jsonl) nor a figure")
+    return _judge(folder)
+
+
+def _judge(folder: Folder) -> Result:
+    from .lint_rules import RULES
+
     verdicts = []
     for rule in RULES:
         hidden = rule.why_not
-        if rule.needs == "journal" and folder.journal is None:
+        if folder.found is None and rule.needs != "figures":
+            hidden = hidden or "no study is here"
+        elif rule.needs == "journal" and folder.journal is None:
             hidden = "journal.jsonl is not here"
         elif rule.needs == "figures" and not folder.figures and not folder.undescribed:
             hidden = "no figures are here: run `python3 -m analysis report` first"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Iterator
 
-from . import style
+from . import load, style
 from .lint import Finding, Folder
 from .severity import GRAVE, NOTE
 
@@ -58,8 +58,13 @@ def grey(folder: Folder) -> Iterator[Finding]:
 
 def current(folder: Folder) -> Iterator[Finding]:
     for file, figure in folder.figures:
-        if figure["records"] != folder.study.records_hash:
-            yield Finding(GRAVE, file, _name(figure), "was drawn from other records than those here", "run `python3 -m analysis report`")
+        source = folder.source(file, figure)
+        if not figure["records"]:
+            continue  # of several files (compare), which its base names
+        if source is None:
+            yield Finding(NOTE, file, _name(figure), "what it was drawn from is not here", "keep a figure beside its data")
+        elif load.digest(source) != figure["records"]:
+            yield Finding(GRAVE, file, _name(figure), f"was drawn from another {source.name} than the one here", "draw it again, with the command that wrote it")
 
 
 def _name(figure: dict[str, Any]) -> str:

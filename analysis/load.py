@@ -185,8 +185,8 @@ def load(directory: Path) -> Study:
         raise InputError(directory, "no such folder (expected the folder that a study wrote)")
     context, raw = _context(directory / "context.json")
     records = _records(directory / "records.jsonl")
-    digest = hashlib.sha256((directory / "records.jsonl").read_bytes()).hexdigest()[:32]
-    study = Study(directory, context, [r for r in records if not r.config.is_peer], [r for r in records if r.config.is_peer], digest, raw)
+    study = Study(directory, context, [r for r in records if not r.config.is_peer], [r for r in records if r.config.is_peer],
+                  digest(directory / "records.jsonl"), raw)
     study.hypotheses, study.weak  # read now, so that what is wrong with them is found first
     return study
 
@@ -198,6 +198,11 @@ def read_text(path: Path, missing: str = "no such file (was the study interrupte
         raise InputError(path, missing) from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(path, f"cannot be read: {error}") from None
+
+
+def digest(path: Path) -> str:
+    """What tells a file from its later versions."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:32]
 
 
 def parse(text: str, path: Path, line: int | None, nan: bool = False) -> dict[str, Any]:

@@ -34,6 +34,12 @@ class LoopCosts:
     raw: dict[str, Any] = field(repr=False, default_factory=dict)
 
     @property
+    def machine(self) -> str | None:
+        """Of the costs, as captions name it; None in older files."""
+        said = [value for key in ("cpu", "runtime") if isinstance(value := self.raw.get(key), str) and value]
+        return ", ".join(said) or None
+
+    @property
     def n(self) -> int:
         return len(self.costs)
 

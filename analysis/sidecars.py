@@ -1,13 +1,14 @@
 """The file beside each figure, NAME.json, for programs: what the caption says, from which records, and what was drawn.
 
-{schema, name, title, caption, reading, facts (captions.Facts, or null), records (hash of the records.jsonl that was drawn, or
-""), size_inches [w, h], axes [text of each labelled axis], smallest_text_pt, lines_across_categories [..], alike_in_grey
+{schema, name, title, caption, reading, facts (captions.Facts, or null), records (hash of the file that was drawn, or ""), source
+(that file, as a path from the figure's folder; absent in older ones: ../records.jsonl), size_inches [w, h], axes [text of each labelled axis], smallest_text_pt, lines_across_categories [..], alike_in_grey
 [[name, name], ..]}. The last three are what a reader of the figure would trip over, found in the drawn artists.
 """
 
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import asdict
 from itertools import combinations
 from pathlib import Path
@@ -27,13 +28,24 @@ from .load import InputError
 from .statistics import is_number
 
 SCHEMA = 1
+RECORDS = "../records.jsonl"  # what a report draws, from its figures/
 GREY_STEP = 0.12  # least difference of lightness (0 to 1) of two shades that a legend tells apart by nothing else
 
 
-def files(drawing: Drawing, records: str = "") -> dict[str, bytes]:
-    """NAME.svg, .pdf, .png and .json."""
+def drawn_from(path: Path, folder: Path) -> tuple[str, str]:
+    """The hash of a file, and its path from the folder of the figures that are drawn from it."""
+    return load.digest(path), os.path.relpath(path.resolve(), folder.resolve())
+
+
+def files(drawing: Drawing, records: str = "", source: str = RECORDS) -> dict[str, bytes]:
+    """NAME.svg, .pdf, .png and .json. records and source: drawn_from()."""
     made = {f"{drawing.name}.{kind}": content for kind, content in style.outputs(drawing.figure).items()}
-    return made | {f"{drawing.name}.json": (json.dumps(describe(drawing, records), indent=1, ensure_ascii=False) + "\n").encode()}
+    return made | {f"{drawing.name}.json": (json.dumps(describe(drawing, records, source), indent=1, ensure_ascii=False) + "\n").encode()}
+
+
+def is_one(path: Path) -> bool:
+    """Whether a file of JSON lies beside a figure to describe it, rather than holding data of its own."""
+    return "smallest_text_pt" in load.parse(load.read_text(path), path, None)
 
 
 def read(path: Path) -> dict[str, Any]:
@@ -43,6 +55,7 @@ def read(path: Path) -> dict[str, Any]:
     pairs = value.get("alike_in_grey")
     right = {"schema": value.get("schema") == SCHEMA, "title": isinstance(value.get("title"), str),
              "facts": value.get("facts") is None or isinstance(value["facts"], dict), "records": isinstance(value.get("records"), str),
+             "source": isinstance(value.get("source", RECORDS), str),
              "size_inches": isinstance(size, list) and len(size) == 2 and all(map(is_number, size)),
              "axes": isinstance(value.get("axes"), list), "smallest_text_pt": smallest is None or is_number(smallest),
              "lines_across_categories": isinstance(value.get("lines_across_categories"), list),
@@ -53,11 +66,11 @@ def read(path: Path) -> dict[str, Any]:
     return value
 
 
-def describe(drawing: Drawing, records: str) -> dict[str, Any]:
+def describe(drawing: Drawing, records: str, source: str = RECORDS) -> dict[str, Any]:
     figure, caption = drawing.figure, drawing.caption
     labels = [words for axes in figure.axes for words in (axes.get_xlabel(), axes.get_ylabel()) if words]
     return {"schema": SCHEMA, "name": drawing.name, "title": caption.title, "caption": caption.body, "reading": caption.reading,
-            "facts": asdict(caption.facts) if caption.facts else None, "records": records,
+            "facts": asdict(caption.facts) if caption.facts else None, "records": records, "source": source if records else "",
             "size_inches": [round(float(side), 3) for side in figure.get_size_inches()], "axes": list(dict.fromkeys(labels)),
             "smallest_text_pt": smallest_text(figure),
             "lines_across_categories": [name for axes in figure.axes for name in across_categories(axes)],
@@ -85,8 +98,9 @@ def _categorical(axis: Any) -> bool:
         return False
     if not len(axis.get_majorticklocs()):
         return True  # rows that are labelled by hand
-    labels = [label.get_text().strip() for label in axis.get_majorticklabels()]
-    return any(words and not _number(words) for words in labels)
+    labels = [words for label in axis.get_majorticklabels() if (words := label.get_text().strip())]
+    # A word among numbers ("none", "default") is the place of what has no number.
+    return sum(not _number(words) for words in labels) > len(labels) / 2
 
 
 def _number(words: str) -> bool:

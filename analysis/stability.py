@@ -180,7 +180,7 @@ def write(path: Path, folder: Path) -> list[Path]:
     found = envelopes(read(path))
     with matplotlib.rc_context(style.RC):
         drawn = drawing.draw(found)
-        files = sidecars.files(drawn)
+        files = sidecars.files(drawn, *sidecars.drawn_from(path, folder))
     made = table(found)
     files |= {f"{made.name}.csv": made.csv(), f"{made.name}.tex": made.tex(),
               f"{made.name}.txt": f"{drawn.caption.plain}\n{drawn.caption.reading}\n"}

@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.image import imread
 
-from . import load, style, text, writing
+from . import load, sidecars, style, text, writing
 from .load import InputError, is_whole
 from .statistics import is_number
 from .tables import Table
@@ -178,7 +178,8 @@ def plain(trace: Trace) -> str:
 
 
 def write(trace: Trace, folder: Path) -> list[Path]:
-    """Gantt, shares and, where the trace names one, the heat map, as svg, pdf and png with their captions; the table of threads."""
+    """Gantt, shares and, where the trace names one, the heat map, as svg, pdf and png with their captions and what lies beside each figure; the table
+    of threads."""
     from .figures import gantt  # matplotlib's figures only when they are drawn
 
     table = threads_table(trace)
@@ -186,9 +187,10 @@ def write(trace: Trace, folder: Path) -> list[Path]:
     captions = ""
     with matplotlib.rc_context(style.RC):
         for drawing in gantt.draw(trace, table.numbers):
-            files |= {f"{drawing.name}.{kind}": content for kind, content in style.outputs(drawing.figure).items()}
+            files |= sidecars.files(drawing, *sidecars.drawn_from(trace.path, folder))
             captions += f"{drawing.name}: {drawing.caption.plain} {drawing.caption.reading}\n\n"
     files["captions.txt"] = captions
+    writing.refuse_inputs((folder / name for name in files), [trace.path, *([trace.image.path] if trace.image else [])])
     for name, content in files.items():
         writing.write(folder / name, content)
     return [folder / name for name in sorted(files)]

@@ -14,7 +14,7 @@ import matplotlib
 import numpy as np
 import pandas as pd
 
-from . import load, replays, scaling_laws, schedule_model, statistics, style, text, work_stealing, writing
+from . import load, replays, scaling_laws, schedule_model, sidecars, statistics, style, text, work_stealing, writing
 from .comparison import Analysis
 from .load import InputError, Record, Study
 from .loop_costs import LoopCosts, read
@@ -323,7 +323,7 @@ def write(path: Path, folder: Path, study: Path | None = None, scene: str | None
     files: dict[str, str | bytes] = {}
     with matplotlib.rc_context(style.RC):
         for drawn in (drawing.curves(model, found), drawing.heat_map(model)):
-            files |= {f"{drawn.name}.{kind}": content for kind, content in style.outputs(drawn.figure).items()}
+            files |= sidecars.files(drawn, *sidecars.drawn_from(path, folder))
             files[f"{drawn.name}.txt"] = f"{drawn.caption.plain}\n{drawn.caption.reading}\n"
     for table in made:
         files |= {f"{table.name}.csv": table.csv(), f"{table.name}.tex": table.tex()}

@@ -334,6 +334,8 @@ std::string costs_text(const Point& point, const LoopShape& shape, const LoopCos
             {"numeric", point.numeric},
             {"schedule", to_string(point.execution)},
             {"threads", point.execution.threads},
+            {"runtime", runtime_of(point.execution)},
+            {"cpu", cpu_model()},
             {"stamp_us", rounded_us(costs.stamp_seconds)},
             {"serial_us", rounded_us(costs.serial_loop_seconds)}};
   for (const auto& [schedule, cost] : schedules) {

@@ -8,11 +8,12 @@ from matplotlib.lines import Line2D
 
 from .. import statistics, style, text
 from ..adopt import Adoption
-from ..captions import Caption
+from ..captions import Caption, Facts
 from .common import Block, Drawing, Point, Row, bounds, dots, named, pages, part, spread
 from .scaling import curve, thread_axis
 
 SECTION = "Adopted program"
+BASE = "Base: the same program and OMP_SCHEDULE with OMP_NUM_THREADS=1, named with its seconds in the legend."
 
 
 def draw(adoption: Adoption) -> Iterator[Drawing]:
@@ -52,8 +53,9 @@ def _scaling(adoption: Adoption) -> Drawing:
         f"Speedup and efficiency over threads of {adoption.title}",
         " ".join([
             _estimates("medians of paired ratios", adoption, " / ".join(kinds)),
-            "Base: the same program and OMP_SCHEDULE with OMP_NUM_THREADS=1, named with its seconds in the legend.", *_notes(adoption)]),
-        "A line on the dashed one scales ideally. Reading the model and writing the picture are in the time, and do not scale."))
+            BASE, *_notes(adoption)]),
+        "A line on the dashed one scales ideally. Reading the model and writing the picture are in the time, and do not scale.",
+        _facts("medians of paired ratios", adoption, " / ".join(kinds), BASE)))
 
 
 def _times(adoption: Adoption) -> Iterator[Drawing]:
@@ -80,12 +82,24 @@ def _times(adoption: Adoption) -> Iterator[Drawing]:
                 _estimates("medians", adoption, statistics.median_estimate(adoption.points[0].samples).kind),
                 f"Ringed: the fastest point ({best.name}) and those that cannot be told apart from it (rank test, Holm-corrected, and"
                 " paired interval).", *_notes(adoption)]),
-            "Left is faster. Where intervals overlap or both points are ringed, do not name a winner.")
+            "Left is faster. Where intervals overlap or both points are ringed, do not name a winner.",
+            _facts("medians", adoption, statistics.median_estimate(adoption.points[0].samples).kind, None))
         yield Drawing(named("adopt_times", page, len(split)), SECTION, figure, caption)
 
 
+def _facts(what: str, adoption: Adoption, kind: str, base: str | None) -> Facts:
+    """Each sample is a process of its own, so that there are as many launches as samples."""
+    counts = [point.samples.n for point in adoption.points]
+    sampled = (min(counts), max(counts))
+    return Facts(what, kind if _has_intervals(adoption) and kind else None, base, sampled, sampled, adoption.machine)
+
+
+def _has_intervals(adoption: Adoption) -> bool:
+    return all(point.samples.n >= statistics.MIN_SAMPLES for point in adoption.points)
+
+
 def _estimates(what: str, adoption: Adoption, kind: str) -> str:
-    if any(point.samples.n < statistics.MIN_SAMPLES for point in adoption.points):
+    if not _has_intervals(adoption):
         return f"Points are {what} without intervals: too few samples ({adoption.sampled} a point)."
     return f"Points are {what} with 95 % intervals ({kind}), {adoption.sampled} samples a point."
 

@@ -8,12 +8,14 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from .. import style, text
-from ..captions import Caption
+from ..captions import Caption, Facts
 from ..stability import BREAKING, SWEEPS, Envelope
 from .common import Drawing
 from .scales import round_values, said, set_ticks
 
 COLUMNS = 2
+# Pictures are compared, not times: a mode draws the same bits on every machine.
+MACHINE = "any (modes with approximate reciprocals or contracted multiply-adds: any CPU of one type)"
 LEFT, RIGHT, HEAD = 0.72, 0.1, 0.32  # inches
 GAP = 0.72  # between the rows of panels: ticks, an axis label and a title
 DASHES = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1, 1, 1)), (0, (3, 1, 1, 1, 1, 1)), (0, (8, 2)))
@@ -112,4 +114,4 @@ def _caption(found: list[Envelope], modes: list[str]) -> Caption:
     if beyond:
         notes.append(f"Wrong beyond their stated bound somewhere: {text.listing(beyond, len(beyond))}.")
     return Caption("Stability envelopes", " ".join(notes), "A line in the grey band has no wrong pixel; lines there are set apart only to be"
-                   " seen. Right of (or left of) its ring a mode is not to be used.")
+                   " seen. Right of (or left of) its ring a mode is not to be used.", Facts(None, None, None, None, None, MACHINE))

@@ -14,7 +14,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from .. import style, text
-from ..captions import Caption
+from ..captions import Caption, Facts
 from ..trace import SHARES, CostImage, Trace
 from .common import Drawing
 
@@ -32,6 +32,11 @@ def draw(trace: Trace, threads: pd.DataFrame) -> Iterator[Drawing]:
     yield _shares(trace, threads)
     if trace.image is not None:
         yield _cost(trace, trace.image)
+
+
+def _frame_facts(trace: Trace) -> Facts:
+    """No estimates: a traced frame is no sample, and costs are times of one thread."""
+    return Facts(None, None, None, None, None, trace.machine)
 
 
 def _facts(trace: Trace) -> str:
@@ -88,7 +93,8 @@ def _gantt(trace: Trace) -> Drawing:
     merged = f"Up to {joined} chunks in a row are one mark. " if joined != 1 else ""
     return Drawing("gantt", SECTION, figure, Caption(
         f"Chunks by thread, {trace.title}", chosen + merged + _facts(trace),
-        "White within a lane is time outside of chunks: at the right end of it the thread waits for the others."))
+        "White within a lane is time outside of chunks: at the right end of it the thread waits for the others.",
+        _frame_facts(trace)))
 
 
 def covered(low: np.ndarray, high: np.ndarray, span: float) -> np.ndarray:
@@ -118,7 +124,8 @@ def _shares(trace: Trace, threads: pd.DataFrame) -> Drawing:
     busy = threads["chunks_us"]
     note = f"Imbalance (longest / mean time in chunks) {busy.max() / busy.mean():.3f}. " if busy.mean() > 0 else ""
     return Drawing("thread_shares", SECTION, figure, Caption(f"Time of each thread, {trace.title}", note + _facts(trace),
-                                                       "Bars are equally long: each is the whole loop, divided by what the thread did."))
+                                                       "Bars are equally long: each is the whole loop, divided by what the thread did.",
+                                                       _frame_facts(trace)))
 
 
 def _cost(trace: Trace, image: CostImage) -> Drawing:
@@ -142,4 +149,4 @@ def _cost(trace: Trace, image: CostImage) -> Drawing:
         f"Cost of each {trace.metadata['unit']}, {trace.title}",
         f"Median time of each {trace.metadata['unit']} on one thread, without what the stamps add, over the picture in grey.{spread}{hidden} The scale ends at"
         f" the 99.9th percentile of the pixels. Machine: {trace.machine}.",
-        "Brighter costs more; the bar shows the colours as they look over a middle grey."), raster=True)
+        "Brighter costs more; the bar shows the colours as they look over a middle grey.", _frame_facts(trace)), raster=True)

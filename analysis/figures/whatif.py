@@ -10,7 +10,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
 from .. import style, text
-from ..captions import Caption
+from ..captions import Caption, Facts
+from ..loop_costs import LoopCosts
 from ..whatif import ASKED, CAVEAT, RULES, THREADS, TIE, Comparison, Measured, Model, Rule
 from .common import Drawing
 from .schedules import CELL_HEIGHT
@@ -88,8 +89,9 @@ def _bounds(axes: Axes, model: Model) -> None:
 def _curves_caption(model: Model, found: Comparison | None, points: dict[Rule, list[Measured]]) -> Caption:
     costs = model.costs
     sentences = [f"Lines are predictions from the traced costs of {costs.n} iterations ({costs.unit}s), each with the chunk or grain that is predicted"
-                 f" best at {ASKED[-1]} threads. {CAVEAT}. Base: the loop on one thread, {text.number(costs.total / 1e3)} ms, without dispatch. The hatched"
+                 f" best at {ASKED[-1]} threads. {CAVEAT}. {_base(costs)} The hatched"
                  " part lies beyond the bounds by the number of threads and by the largest iteration."]
+    kinds = ""
     if points:
         shown = [m for of in points.values() for m in of]
         counts = text.span([m.time.n for m in shown])
@@ -97,9 +99,17 @@ def _curves_caption(model: Model, found: Comparison | None, points: dict[Rule, l
         sentences.append("Large symbols are measured: the median speedup of the whole raster stage of the fastest measured chunk over the same kernel on"
                          f" one thread ({counts}; {f'95 % intervals, {kinds}' if kinds else 'no intervals: too few samples'}). Machine: {found.machine}.")
     else:
-        sentences.append("Nothing was measured.")
+        sentences.append("Nothing was measured." + (f" Costs of {costs.machine}." if costs.machine else ""))
+    samples = [m.record.samples for of in points.values() for m in of]
+    counts, launches = [s.n for s in samples], [s.launch_count for s in samples]
+    facts = Facts("median speedups" if samples else None, kinds or None if samples else None, _base(costs), (min(counts), max(counts)) if samples else None,
+                  (min(launches), max(launches)) if samples else None, found.machine if samples else costs.machine)
     return Caption("What if there were more threads", " ".join(sentences),
-                   "A line that bends before the hatched part loses to its chunks or their dispatch; symbols below their line lose to what no prediction has.")
+                   "A line that bends before the hatched part loses to its chunks or their dispatch; symbols below their line lose to what no prediction has.", facts)
+
+
+def _base(costs: LoopCosts) -> str:
+    return f"Base: the loop on one thread, {text.number(costs.total / 1e3)} ms, without dispatch."
 
 
 def heat_map(model: Model) -> Drawing:
@@ -145,5 +155,6 @@ def heat_map(model: Model) -> Drawing:
         f"Cells are the predicted speedup over the loop on one thread ({text.number(model.costs.total / 1e3)} ms), divided by {threads}, in per cent;"
         f" the rules of libgomp and libomp differ in guided. {CAVEAT}: nothing here was measured but the costs of {model.costs.n} iterations and the"
         f" overhead of a chunk. Frames: the fastest (white on dark cells), and dashed what is within {text.percent(TIE)} of it.",
-        "Look for dark cells: small chunks pay for dispatch, large ones for imbalance.")
+        "Look for dark cells: small chunks pay for dispatch, large ones for imbalance.",
+        Facts(None, None, _base(model.costs), None, None, model.costs.machine))
     return Drawing("whatif_schedules", SECTION, figure, caption)

@@ -46,7 +46,7 @@ def test_time_of_the_threads_adds_up(tmp_path: Path) -> None:
 def test_figures_captions_and_words(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     assert main(["trace", str(made(tmp_path, image=True)), "--out", str(tmp_path / "out")]) == 0
     written = {path.name for path in (tmp_path / "out").iterdir()}
-    assert written == {f"{n}.{k}" for n in ("gantt", "thread_shares", "cost") for k in ("png", "svg", "pdf")} | {"threads.csv", "threads.tex", "captions.txt"}
+    assert written == {f"{n}.{k}" for n in ("gantt", "thread_shares", "cost") for k in ("png", "svg", "pdf", "json")} | {"threads.csv", "threads.tex", "captions.txt"}
     captions = (tmp_path / "out/captions.txt").read_text()
     for words in ("no sample", "no interval", "0.200 ms", "0.150 ms", "A CPU", "libgomp", "stamps", "Imbalance (longest / mean time in chunks) 1.385"):
         assert words in captions
