@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <thread>
 
@@ -84,17 +85,20 @@ TEST(Noise, ShortBlocksAreJoinedAndTheLastWindowMayBeShorter) {
 TEST(Noise, WhatTheStudyItselfUsedIsNoOtherLoad) {
   if (!read_cpu_times()) GTEST_SKIP() << "no /proc/stat";
   NoiseWatch watch;
-  watch.begin(0, own_cpu_seconds());
+  const double own_before = own_cpu_seconds();
+  watch.begin(0, own_before);
   volatile double sink = 0;
   const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(600);
   while (std::chrono::steady_clock::now() < end) sink = sink + 1;
-  const double own = own_cpu_seconds();
-  const auto without = NoiseWatch(watch).end_of_block(0, 0, false), with = watch.end_of_block(0, own, false);
-  ASSERT_TRUE(with && without);
-  const double all = without->at("other_load_cpus"), others = with->at("other_load_cpus");
-  // However much others do, this thread's time is taken from the whole.
-  EXPECT_LE(others, all);
-  EXPECT_GE(all, 0.3);
+  const double own = own_cpu_seconds() - own_before;
+  // The same window, once as if the study had used nothing.
+  const auto counted = NoiseWatch(watch).end_of_block(0, own_before, false);
+  const auto taken_off = watch.end_of_block(0, own_before + own, false);
+  ASSERT_TRUE(counted && taken_off);
+  const double all = counted->at("other_load_cpus"), others = taken_off->at("other_load_cpus");
+  const double mine = own / taken_off->at("seconds").get<double>();
+  EXPECT_GE(all, mine - 0.1);  // /proc/stat counts in hundredths of a second
+  EXPECT_NEAR(others, std::max(0.0, all - mine), 0.1);
 }
 
 }  // namespace
