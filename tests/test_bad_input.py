@@ -298,3 +298,10 @@ def test_missing_program_says_what_to_do(tmp_path: Path, monkeypatch: pytest.Mon
     with pytest.raises(pytest.fail.Exception, match="scripts/setup"):
         run("--version")
     assert (ROOT / "scripts/setup").is_file()
+
+
+@pytest.mark.parametrize("command", [["render", "-o", "out.ppm"], ["verify"], ["explain"], ["trace", "-o", "trace.json"], ["selftest"]], ids=lambda c: c[0])
+def test_no_command_runs_more_threads_than_cpus_unasked(command: list[str], tmp_path: Path) -> None:
+    refused(run(command[0], "teapot:triangles=300", *command[1:], "--threads", CPUS + 1, cwd=tmp_path),
+            "--threads", f"{CPUS + 1} threads on {CPUS} CPUs", "--oversubscribe")
+    assert list(tmp_path.iterdir()) == []
