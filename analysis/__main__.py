@@ -1,4 +1,4 @@
-"""Command line: python3 -m analysis report DIR, table DIR, speed DIR, compare DIR_A DIR_B, lint DIR, selftest FILE, adopt DIR, stability FILE, trace FILE, whatif FILE."""
+"""Command line: python3 -m analysis report DIR, table DIR, speed DIR, compare DIR_A DIR_B, lint DIR, selftest FILE, adopt DIR, stability FILE, trace FILE, whatif FILE, compilers DIR."""
 
 from __future__ import annotations
 
@@ -108,6 +108,10 @@ def parser() -> Parser:
                         help="output of `rasterbench replay --json`, to state the error of the rules; may be repeated")
     whatif.add_argument("--steal-us", metavar="X", type=microseconds, help="cost of a steal in microseconds (default: that of a chunk)")
     whatif.add_argument("--out", metavar="FOLDER", type=Path, required=True, help="where to write")
+    compilers = commands.add_parser("compilers", help="compare programs of several compilers and flags, as scripts/compilers measured them",
+                                    description="Writes DIR/compilers.csv, .tex, .txt and compilers_ratio.png, .svg, .pdf with its caption,"
+                                                " then prints the table.")
+    compilers.add_argument("directory", metavar="DIR", type=Path, help="folder that scripts/compilers wrote, with compilers.json")
     report.add_argument("--out", metavar="FILE", type=Path, help="where to write the report (default: DIR/report.html)")
     return main
 
@@ -166,6 +170,14 @@ def main(arguments: list[str] | None = None) -> int:
             result = lint.lint_directory(options.directory)
             print(lint.as_json(result) if options.json else lint.plain(result))
             return result.status
+        if options.command == "compilers":
+            from . import compilers
+
+            found = compilers.Comparison(options.directory)
+            written = compilers.write(found)
+            print(compilers.plain(found))
+            print(f"written: {', '.join(map(str, written))}")
+            return 0
         study = load(options.directory)
         # Imported late: a wrong path should not wait for matplotlib.
         from .comparison import Analysis
