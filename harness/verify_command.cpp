@@ -22,7 +22,7 @@ struct VerifyOptions {
   std::string size, fill = "closed", near_rule = "clip", techniques = "all";
   int threads = 0;
   bool oversubscribe = false;
-  std::string difference, explain;
+  std::string difference, explain, ids, depth;
   bool json = false;
 };
 
@@ -76,19 +76,21 @@ void print_row(const Json& row) {
                             : Json(of("embree", "edge_ties").get<std::int64_t>() +
                                    of("embree", "depth_ties").get<std::int64_t>());
   const bool bounded = verify.at("bound").at("bounded").get<bool>();
-  fmt::print(fmt::runtime(kRow), row.at("numeric").get<std::string>(), row.at("kernel").get<std::string>(),
-             verify.at("conforms").get<bool>() ? "yes" : "NO", count_or_dash(of("oracle", "wrong")),
-             count_or_dash(of("oracle", "edge")), count_or_dash(of("oracle", "depth")),
-             count_or_dash(of("oracle", "exact_ties")), count_or_dash(of("oracle", "unexplained")),
-             predicted == Json(-1) ? "any" : count_or_dash(predicted),
-             number_or_dash(of("oracle", "worst_distance_px")),
-             number_or_dash(of("oracle", "max_depth_error_steps")), count_or_dash(of("end_to_end", "wrong")),
-             count_or_dash(of("end_to_end", "errors")), count_or_dash(ray_ties),
-             count_or_dash(of("embree", "errors")),
-             !row.at("failure").is_null()       ? "FAILED"
-             : !bounded                         ? "unbounded"
-             : of("oracle", "wrong") == Json(0) ? "exact"
-                                                : "within bound");
+  fmt::print(
+      fmt::runtime(kRow), row.at("numeric").get<std::string>(),
+      row.at("kernel").is_null() ? std::string("(given picture)") : row.at("kernel").get<std::string>(),
+      verify.at("conforms").get<bool>() ? "yes" : "NO", count_or_dash(of("oracle", "wrong")),
+      count_or_dash(of("oracle", "edge")), count_or_dash(of("oracle", "depth")),
+      count_or_dash(of("oracle", "exact_ties")), count_or_dash(of("oracle", "unexplained")),
+      predicted == Json(-1) ? "any" : count_or_dash(predicted),
+      number_or_dash(of("oracle", "worst_distance_px")),
+      number_or_dash(of("oracle", "max_depth_error_steps")), count_or_dash(of("end_to_end", "wrong")),
+      count_or_dash(of("end_to_end", "errors")), count_or_dash(ray_ties),
+      count_or_dash(of("embree", "errors")),
+      !row.at("failure").is_null()       ? "FAILED"
+      : !bounded                         ? "unbounded"
+      : of("oracle", "wrong") == Json(0) ? "exact"
+                                         : "within bound");
 }
 
 /// One kernel in one mode: draws, compares with the specification, adds the verdicts on the mode.
@@ -108,6 +110,45 @@ Json verify_row(const std::string& kernel, const Picture& specification, const J
   return row;
 }
 
+/// The picture that `render --ids --depth` of some build wrote; its colours are those of its ids.
+Picture read_picture(const VerifyOptions& options, const Scene& scene) {
+  Array<std::int32_t> ids = read_npy_ids(options.ids);
+  Array<float> depths = read_npy_depths(options.depth);
+  if (ids.width != depths.width || ids.height != depths.height)
+    throw InputError({.file = options.depth, .field = "shape"},
+                     fmt::format("({}, {}) is not that of the ids, ({}, {})", depths.height, depths.width,
+                                 ids.height, ids.width));
+  const auto triangles = static_cast<std::int64_t>(scene.model.triangles.size());
+  for (std::size_t i = 0; i < ids.values.size(); ++i)
+    if (ids.values[i] < -1 || ids.values[i] >= triangles)
+      throw InputError({.file = options.ids, .field = fmt::format("element {}", i)},
+                       fmt::format("{} is no triangle of the model, which has {}", ids.values[i], triangles));
+  Picture picture{.width = ids.width, .height = ids.height};
+  picture.ids = std::move(ids.values);
+  picture.depths = std::move(depths.values);
+  picture.colours = shade_owners(picture.ids, scene);
+  picture.values.assign(picture.depths.begin(), picture.depths.end());
+  return picture;
+}
+
+/// A given picture against the specification of a mode, and the verdicts on that picture itself.
+Json picture_row(Judge& judge, const Picture& picture, const Picture& specification, const ModeInfo& mode) {
+  if (!std::equal(specification.values.begin(), specification.values.end(), specification.depths.begin()))
+    throw InputError({.field = "--numeric"},
+                     fmt::format("{} keeps depths in another format than --depth has", mode.name));
+  const std::int64_t differing = differing_pixels(picture, specification);
+  const Json verdicts = judge_picture(judge, picture, mode);
+  Json row{{"numeric", mode.name}, {"kernel", nullptr}};
+  Json& verify = row["verify"];
+  verify["conforms"] = differing == 0;
+  verify["differing_pixels"] = differing;
+  for (const char* verdict : kVerdicts) verify[verdict] = verdicts.at(verdict);
+  row["failure"] = verdicts.at("failure");
+  if (differing != 0)
+    row["failure"] = fmt::format("{} pixels differ from the specification of {}", differing, mode.name);
+  return row;
+}
+
 /// Verifies one scene; returns the number of rows that failed.
 int verify_scene(const VerifyOptions& options, const std::string& model, Json& rows) {
   const Scene scene = open_scene(model, options.scene_file);
@@ -115,6 +156,15 @@ int verify_scene(const VerifyOptions& options, const std::string& model, Json& r
   settings.width = scene.parameters.width;
   settings.height = scene.parameters.height;
   if (!options.size.empty()) std::tie(settings.width, settings.height) = parse_size(options.size, "--size");
+  Picture given;
+  if (!options.ids.empty()) {
+    given = read_picture(options, scene);
+    if (!options.size.empty() && (given.width != settings.width || given.height != settings.height))
+      throw InputError({.file = options.ids, .field = "shape"},
+                       fmt::format("({}, {}) is not --size {}", given.height, given.width, options.size));
+    settings.width = given.width;
+    settings.height = given.height;
+  }
   settings.fill = parse_fill(options.fill, "--fill");
   settings.geometry.near_rule = parse_near(options.near_rule, "--near");
   settings.geometry.isa = best_isa();
@@ -152,11 +202,16 @@ int verify_scene(const VerifyOptions& options, const std::string& model, Json& r
         continue;
       }
     }
-    progress.show("verifying", static_cast<double>(done), static_cast<double>(options.numerics.size()), name);
+    const bool is_given = !options.ids.empty();
+    if (!is_given)  // one picture: nothing to count, and it may be refused
+      progress.show("verifying", static_cast<double>(done), static_cast<double>(options.numerics.size()),
+                    name);
     const Picture specification = render_specification(scene, name, settings);
-    const Json verdicts = judge_picture(judge, specification, mode);
+    const Json verdicts = is_given ? Json() : judge_picture(judge, specification, mode);
+    if (is_given) kernels = {"(given picture)"};
     for (const std::string& kernel : kernels) {
-      Json row = verify_row(kernel, specification, verdicts, {&scene, settings, execution}, mode);
+      Json row = is_given ? picture_row(judge, given, specification, mode)
+                          : verify_row(kernel, specification, verdicts, {&scene, settings, execution}, mode);
       row["model"] = model;
       row["size"] = {settings.width, settings.height};
       if (!options.json) {
@@ -199,6 +254,17 @@ int verify_scene(const VerifyOptions& options, const std::string& model, Json& r
 }
 
 void check_options(VerifyOptions& options) {
+  if (options.ids.empty() != options.depth.empty())
+    throw InputError({.field = options.ids.empty() ? "--ids" : "--depth"},
+                     "is missing: a picture is judged by its ids and its depths");
+  if (!options.ids.empty()) {
+    if (options.model.empty() || options.numerics.size() != 1 || !options.kernels.empty())
+      throw InputError({.field = "--ids"}, "is a picture of one MODEL in one --numeric, and of no --kernel");
+    if (!options.difference.empty() || !options.explain.empty())
+      throw InputError({.field = "--ids"}, "goes without --difference and --explain");
+    if (!available_mode(options.numerics.front(), "--numeric").has_screen_triangles)
+      throw InputError({.field = "--ids"}, "needs a mode that the exact oracle can judge");
+  }
   if (options.kernels.empty()) options.kernels = {"tile_parallel", "ray_cast"};
   for (const std::string& kernel : options.kernels) find_kernel(kernel);
   parse_techniques(options.techniques, "--techniques");
@@ -248,6 +314,10 @@ void add_verify_command(CLI::App& app, Outcome& outcome) {
                       "IMAGE.png: where one mode's picture differs from the oracle's, by class");
   command->add_option("--explain", o->explain,
                       "X,Y: which triangles claim this pixel, their edges and depths in each arithmetic");
+  command->add_option(
+      "--ids", o->ids,
+      "IDS.npy: judge this picture, as render --ids of any build wrote it, in place of kernels");
+  command->add_option("--depth", o->depth, "DEPTH.npy: the depths of that picture (render --depth)");
   command->add_flag("--json", o->json, "an array of rows in place of the table");
   command->callback([o, &outcome] {
     check_options(*o);

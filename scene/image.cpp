@@ -11,7 +11,10 @@
 #include <bit>
 #include <cerrno>
 #include <cstdlib>
+#include <cstring>
+#include <fstream>
 #include <memory>
+#include <regex>
 #include <string>
 #include <system_error>
 
@@ -210,5 +213,42 @@ void write_npy(const fs::path& path, std::span<const float> values, int width, i
   write_array(path, "<f4", {reinterpret_cast<const char*>(values.data()), values.size_bytes()}, width,
               height);
 }
+
+namespace {
+
+template <class Value>
+Array<Value> read_npy(const fs::path& path, const std::string& type) {
+  std::ifstream file(path, std::ios::binary);
+  const std::string bytes{std::istreambuf_iterator<char>(file), {}};
+  if (!file) throw InputError({.file = path.string()}, "cannot be read");
+  constexpr std::size_t kBeforeHeader = 10;  // magic, version 1.0, length of the header in 16 bits
+  if (bytes.size() < kBeforeHeader || !bytes.starts_with(std::string("\x93NUMPY\x01\x00", 8)))
+    throw InputError({.file = path.string()}, "is no NumPy array of version 1.0");
+  const std::size_t header_size =
+      static_cast<unsigned char>(bytes[8]) + 256 * std::size_t{static_cast<unsigned char>(bytes[9])};
+  if (bytes.size() < kBeforeHeader + header_size)
+    throw InputError({.file = path.string()}, "ends within its header");
+  const std::string header = bytes.substr(kBeforeHeader, header_size);
+  static const std::regex kForm(
+      R"re(\{'descr': '(...)', 'fortran_order': False, 'shape': \((\d{1,5}), (\d{1,5})\), \}\s*)re");
+  std::smatch parts;
+  if (!std::regex_match(header, parts, kForm) || parts[1] != type)
+    throw InputError({.file = path.string(), .field = "header"},
+                     fmt::format("expected {} values of shape (height, width) in C order", type));
+  Array<Value> array{std::stoi(parts[3]), std::stoi(parts[2])};
+  array.values.resize(static_cast<std::size_t>(array.width) * static_cast<std::size_t>(array.height));
+  const std::size_t wanted = array.values.size() * sizeof(Value), begin = kBeforeHeader + header_size;
+  if (bytes.size() - begin != wanted)
+    throw InputError({.file = path.string()},
+                     fmt::format("holds {} bytes of values in place of {}", bytes.size() - begin, wanted));
+  std::memcpy(array.values.data(), bytes.data() + begin, wanted);
+  return array;
+}
+
+}  // namespace
+
+Array<std::int32_t> read_npy_ids(const fs::path& path) { return read_npy<std::int32_t>(path, "<i4"); }
+
+Array<float> read_npy_depths(const fs::path& path) { return read_npy<float>(path, "<f4"); }
 
 }  // namespace rasterbench

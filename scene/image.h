@@ -1,4 +1,4 @@
-// Image and array writers. Every file is written beside its target and renamed into place when it is
+// Image and array files. Every file is written beside its target and renamed into place when it is
 // complete.
 #pragma once
 
@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <span>
 #include <string_view>
+#include <vector>
 
 namespace rasterbench {
 
@@ -33,5 +34,17 @@ void check_output_path(const std::filesystem::path& path);
 void write_npy(const std::filesystem::path& path, std::span<const std::int32_t> values, int width,
                int height);
 void write_npy(const std::filesystem::path& path, std::span<const float> values, int width, int height);
+
+/// An array of shape (height, width), row 0 on top.
+template <class Value>
+struct Array {
+  int width = 0;
+  int height = 0;
+  std::vector<Value> values = {};
+};
+
+/// What write_npy() wrote. Throws InputError that names the path where the file is anything else.
+Array<std::int32_t> read_npy_ids(const std::filesystem::path& path);
+Array<float> read_npy_depths(const std::filesystem::path& path);
 
 }  // namespace rasterbench

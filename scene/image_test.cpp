@@ -93,6 +93,31 @@ TEST(Image, NpyIsWhatNumpyWrites) {
   EXPECT_EQ((other.size() - 16) % 64, 0u);
 }
 
+TEST(Image, NpyIsReadBack) {
+  const TestFolder folder;
+  const std::vector<std::int32_t> ids = {-1, 0, 1, 2, 3, 2147483647};
+  write_npy(folder / "ids.npy", ids, 3, 2);
+  const Array<std::int32_t> array = read_npy_ids(folder / "ids.npy");
+  EXPECT_EQ(array.width, 3);
+  EXPECT_EQ(array.height, 2);
+  EXPECT_EQ(array.values, ids);
+  const std::vector<float> depths = {1, -1, 0.5f, -0.0f};
+  write_npy(folder / "depth.npy", depths, 4, 1);
+  EXPECT_EQ(read_npy_depths(folder / "depth.npy").values, depths);
+  const auto error = [&](const std::string& bytes) {
+    const auto path = folder.file("bad.npy", bytes);
+    return input_error([&] { read_npy_ids(path); }).substr(path.string().size() + 2);
+  };
+  const std::string bytes = read_bytes(folder / "ids.npy");
+  EXPECT_EQ(error(""), "is no NumPy array of version 1.0");
+  EXPECT_EQ(error(bytes.substr(0, 9)), "is no NumPy array of version 1.0");
+  EXPECT_EQ(error(bytes.substr(0, 100)), "ends within its header");
+  EXPECT_EQ(error(bytes.substr(0, 130)), "holds 2 bytes of values in place of 24");
+  EXPECT_EQ(error(bytes + "x"), "holds 25 bytes of values in place of 24");
+  EXPECT_EQ(error(read_bytes(folder / "depth.npy")),
+            "header: expected <i4 values of shape (height, width) in C order");
+}
+
 TEST(WriteFile, ReplacesAndLeavesNothingElse) {
   const TestFolder folder;
   write_file(folder / "x", "one");

@@ -22,6 +22,69 @@ def rows(*arguments: object, code: int = 0) -> dict[tuple[str, str], dict[str, A
     return {(row["numeric"], row["kernel"]): row for row in json.loads(outcome.stdout)}
 
 
+def drawn_by(drawn: SmallScene, folder: Path, numeric: str = "f32") -> tuple[Path, Path]:
+    """A picture as another build would hand it over."""
+    ids, depth = folder / "ids.npy", folder / "depth.npy"
+    run("render", drawn.dat, drawn.txt, "--numeric", numeric, "--ids", ids, "--depth", depth, "-o", folder / "picture.png").ok()
+    return ids, depth
+
+
+def given(drawn: SmallScene, ids: Path, depth: Path, numeric: str = "f32", code: int = 0) -> dict[str, Any]:
+    return rows(drawn.dat, drawn.txt, "--numeric", numeric, "--ids", ids, "--depth", depth, code=code)[numeric, None]
+
+
+@pytest.mark.parametrize("numeric", ["f32", "fixed_8", "filtered"])
+def test_a_given_picture_is_judged_as_the_kernels_are(numeric: str, teapot: SmallScene, tmp_path: Path) -> None:
+    row = given(teapot, *drawn_by(teapot, tmp_path, numeric), numeric)
+    assert row["verify"]["conforms"] and row["verify"]["differing_pixels"] == 0 and row["failure"] is None
+    own = rows(teapot.dat, teapot.txt, "--numeric", numeric, "--kernel", "tile_parallel")[numeric, "tile_parallel"]["verify"]
+    for verdict in ("oracle", "end_to_end"):
+        assert {k: v for k, v in row["verify"][verdict].items() if k != "seconds"} == {k: v for k, v in own[verdict].items() if k != "seconds"}
+
+
+def test_what_is_wrong_in_a_given_picture_is_found(teapot: SmallScene, tmp_path: Path) -> None:
+    ids, depth = drawn_by(teapot, tmp_path)
+    picture, depths = np.load(ids), np.load(depth)
+    y, x = np.argwhere(picture >= 0)[40]
+    picture[y, x] = -1  # a hole
+    np.save(ids, picture)
+    row = given(teapot, ids, depth, code=1)
+    assert not row["verify"]["conforms"] and row["verify"]["differing_pixels"] == 1 and "1 pixels differ" in row["failure"]
+    assert row["verify"]["oracle"]["unexplained"] == 1 and row["verify"]["oracle"]["false_negatives"] >= 1
+    np.save(ids, np.load(drawn_by(teapot, tmp_path)[0]))
+    depths[y, x] = np.nextafter(depths[y, x], np.float32(0))  # one step nearer
+    np.save(depth, depths)
+    row = given(teapot, ids, depth, code=1)
+    assert row["verify"]["differing_pixels"] == 1 and row["verify"]["oracle"]["wrong"] == given(teapot, *drawn_by(teapot, tmp_path))["verify"]["oracle"]["wrong"]
+    assert given(teapot, *drawn_by(teapot, tmp_path, "fixed_4"), code=1)["verify"]["oracle"]["unexplained"] > 0
+    assert "(given picture)" in run("verify", teapot.dat, teapot.txt, "--numeric", "f32", "--ids", ids, "--depth", depth).stdout
+
+
+@pytest.mark.parametrize("change, words", [
+    (lambda ids, depth: ["--ids", ids], ["--depth", "missing"]),
+    (lambda ids, depth: ["--depth", depth], ["--ids", "missing"]),
+    (lambda ids, depth: ["--ids", depth, "--depth", depth], ["depth.npy", "<i4"]),
+    (lambda ids, depth: ["--ids", ids, "--depth", ids], ["ids.npy", "<f4"]),
+    (lambda ids, depth: ["--ids", ids.parent / "none.npy", "--depth", depth], ["none.npy", "read"]),
+    (lambda ids, depth: ["--ids", ids, "--depth", depth, "--size", "10x10"], ["ids.npy", "shape", "10x10"]),
+    (lambda ids, depth: ["--ids", ids, "--depth", depth, "--kernel", "scanline"], ["--ids", "--kernel"]),
+    (lambda ids, depth: ["--ids", ids, "--depth", depth, "--numeric", "f64"], ["--ids", "one --numeric"]),
+    (lambda ids, depth: [np.save(ids, np.load(ids)[:-1]), "--ids", ids, "--depth", depth][1:], ["depth.npy", "shape"]),
+    (lambda ids, depth: [np.save(ids, np.full_like(np.load(ids), 300)), "--ids", ids, "--depth", depth][1:], ["ids.npy", "element 0", "300"]),
+    (lambda ids, depth: [ids.write_bytes(ids.read_bytes()[:-4]), "--ids", ids, "--depth", depth][1:], ["ids.npy", "bytes"]),
+    (lambda ids, depth: [ids.write_bytes(ids.read_bytes()[:40]), "--ids", ids, "--depth", depth][1:], ["ids.npy", "header"]),
+    (lambda ids, depth: [ids.write_bytes(b"P6"), "--ids", ids, "--depth", depth][1:], ["ids.npy", "NumPy"]),
+    (lambda ids, depth: [np.save(ids, np.asfortranarray(np.load(ids))), "--ids", ids, "--depth", depth][1:], ["ids.npy", "C order"]),
+], ids=range(14))
+def test_bad_given_pictures(change: Any, words: list[str], teapot: SmallScene, tmp_path: Path) -> None:
+    refused(run("verify", teapot.dat, teapot.txt, "--numeric", "f32", *change(*drawn_by(teapot, tmp_path))), *words)
+
+
+def test_depths_in_another_format_are_refused(teapot: SmallScene, tmp_path: Path) -> None:
+    ids, depth = drawn_by(teapot, tmp_path, "filtered-unorm16")
+    refused(run("verify", teapot.dat, teapot.txt, "--numeric", "filtered-unorm16", "--ids", ids, "--depth", depth), "--numeric", "format")
+
+
 def listed_numerics() -> dict[str, dict[str, Any]]:
     return {mode["name"]: mode for mode in json.loads(run("list", "numerics", "--json").ok().stdout)}
 
