@@ -1,6 +1,7 @@
 # generated/build_info.h: what was built, by what, from which commit. Renewed at every build, rewritten when it changes.
 string(TOUPPER "${CMAKE_BUILD_TYPE}" build_type_upper)
-set(build_flags "${CMAKE_CXX_FLAGS} ${CMAKE_CXX_FLAGS_${build_type_upper}} -ffp-contract=off")
+list(JOIN rasterbench_arithmetic " " build_arithmetic)
+set(build_flags "${CMAKE_CXX_FLAGS} ${CMAKE_CXX_FLAGS_${build_type_upper}} ${build_arithmetic}")
 if(RASTERBENCH_NATIVE)
   string(APPEND build_flags " -march=native")
 endif()

@@ -1,10 +1,17 @@
 # How everything is compiled, and the two functions with which each folder says what it holds.
 
-# No contraction into fused multiply-adds (accuracy.md, section 4): the bits must not depend on the CPU. No -ffast-math.
+# No contraction into fused multiply-adds (accuracy.md, section 4): the bits must not depend on the CPU. -Ofast is for the
+# compiler study alone (scripts/compilers), whose strict programs judge what it draws; as a compile option only, since on a
+# link line it would make the whole process flush denormals.
+if(RASTERBENCH_FAST_MATH)
+  set(rasterbench_arithmetic -Ofast -ffp-contract=fast)
+else()
+  set(rasterbench_arithmetic -ffp-contract=off)
+endif()
 add_library(rasterbench_options INTERFACE)
 target_include_directories(rasterbench_options INTERFACE ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR}/generated)
 target_compile_options(rasterbench_options INTERFACE
-  -ffp-contract=off -Wall -Wextra -Wconversion -Wshadow -Wpedantic
+  ${rasterbench_arithmetic} -Wall -Wextra -Wconversion -Wshadow -Wpedantic
   $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>  # false alarms on string + string in GCC 12 (bug 105651)
   $<$<BOOL:${RASTERBENCH_WERROR}>:-Werror>)
 target_link_libraries(rasterbench_options INTERFACE fmt::fmt Threads::Threads)

@@ -16,6 +16,7 @@
 #include "build_info.h"
 #include "harness/hypothesis.h"
 #include "machine/topology.h"
+#include "reference/judge.h"
 
 extern char** environ;
 
@@ -124,7 +125,7 @@ Json describe_context(const Study& study, const StudyOptions& options,
   context["program"] = {{"version", info::kVersion}, {"commit", info::kCommit},
                         {"dirty", info::kDirty},     {"compiler", info::kCompiler},
                         {"flags", info::kFlags},     {"build_type", info::kBuildType},
-                        {"build_id", build_id()}};
+                        {"build_id", build_id()},    {"fast_math", !can_judge()}};
   context["libraries"] = {{"google_benchmark", info::kBenchmarkVersion},
                           {"tbb", *info::kTbbVersion ? info::kTbbVersion : "unavailable: not built in"},
                           {"openmp", openmp_runtime()},

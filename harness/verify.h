@@ -35,11 +35,14 @@ class Verifier {
   /// "threads_observed": n, "failure": text or null}. Draws with the point's own kernel and execution: once
   /// as it is timed, once with the screen triangles permuted. The verdicts on accuracy are those on the
   /// specification's picture, which a point that conforms has drawn to the bit. A peer has no specification:
-  /// its own picture is judged. Throws InputError where a peer cannot draw the point on this machine.
+  /// its own picture is judged. A program that cannot judge draws the frames
+  /// and leaves every verdict open (null). Throws InputError where a peer cannot draw the point on this
+  /// machine.
   Json judge(const Point& point, const Scene& scene);
 
  private:
   Json judge_peer(const Point& point, const Scene& scene);
+  static Json time_unjudged(const Point& point, const Scene& scene);
   struct Expected {
     std::string key;
     Picture specification;

@@ -48,8 +48,19 @@ std::vector<std::uint32_t> shade_owners(std::span<const std::int32_t> ids, const
   return colours;
 }
 
+bool can_judge() {
+#ifdef __FAST_MATH__
+  return false;
+#else
+  return true;
+#endif
+}
+
 Judge::Judge(const Scene& scene, const FrameSettings& settings, int threads)
     : scene_(scene), settings_(settings), camera_(sized_camera(scene, settings)), threads_(threads) {
+  if (!can_judge())
+    throw InputError(
+        "this program was compiled with -ffast-math, its oracle is not exact: judge with another build");
   settings_.geometry.isa = Isa::kBaseline;  // nothing vectorised takes part in a judgement
 }
 Judge::~Judge() = default;

@@ -37,9 +37,14 @@ struct EndToEndVerdict {
 /// The colours of a picture with these owners (-1: background), shaded by the contract.
 std::vector<std::uint32_t> shade_owners(std::span<const std::int32_t> ids, const Scene& scene);
 
+/// False in a program that was compiled with -ffast-math (RASTERBENCH_FAST_MATH), whose oracle is not exact
+/// and whose specifications are not those of the modes. Such a program times frames and judges none.
+bool can_judge();
+
 /// Judges pictures of one scene at one size, fill rule, tie rule and near rule. The scene must outlive it.
 class Judge {
  public:
+  /// Throws InputError in a program that cannot judge.
   Judge(const Scene& scene, const FrameSettings& settings, int threads);
   ~Judge();
 
