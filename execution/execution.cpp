@@ -158,10 +158,21 @@ int available_cpus() {
 int default_threads() { return std::min(available_cpus(), omp_get_max_threads()); }
 
 std::string openmp_runtime() {
-  // Only LLVM's runtime exports the Intel interface; libgomp exports its own.
-  if (dlsym(RTLD_DEFAULT, "kmp_get_blocktime")) return "libomp";
-  if (dlsym(RTLD_DEFAULT, "GOMP_parallel")) return "libgomp";
-  return "unknown";
+  // The file that answers this program's own calls: both runtimes may be loaded, as under LD_PRELOAD.
+#if defined(__clang__)
+  constexpr const char* kParallelRegion = "__kmpc_fork_call";
+#else
+  constexpr const char* kParallelRegion = "GOMP_parallel";
+#endif
+  const auto file_of = [](const char* name) {
+    Dl_info info{};
+    void* const symbol = dlsym(RTLD_DEFAULT, name);
+    return symbol && dladdr(symbol, &info) ? info.dli_fbase : nullptr;
+  };
+  const void* const called = file_of(kParallelRegion);
+  if (!called) return "unknown";
+  // Only LLVM's runtime exports the Intel interface, beside that of libgomp.
+  return called == file_of("kmp_get_blocktime") ? "libomp" : "libgomp";
 }
 
 }  // namespace rasterbench

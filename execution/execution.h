@@ -140,7 +140,7 @@ int available_cpus();
 /// Threads to use where nobody says how many: all CPUs, or what OMP_NUM_THREADS says if that is fewer.
 int default_threads();
 
-/// Name of the OpenMP runtime that is loaded: "libgomp", "libomp" or "unknown".
+/// Name of the OpenMP runtime that runs this program's loops: "libgomp", "libomp" or "unknown".
 std::string openmp_runtime();
 
 }  // namespace rasterbench

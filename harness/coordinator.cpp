@@ -353,6 +353,12 @@ class Coordinator {
             {{"event", "fail"},
              {"reason", fmt::format("binding {} was not kept: {}", point.environment.binding, binding)}},
             state);
+      const std::string& asked = point.environment.runtime;
+      if (const std::string observed = answer.value("runtime_observed", asked);
+          asked != "default" && observed != asked)
+        return record_event({{"event", "fail"},
+                             {"reason", fmt::format("{} was asked for, {} ran the loops", asked, observed)}},
+                            state);
       if (answer.at("picture") != state.judgement.at("picture"))
         return record_event({{"event", "fail"}, {"reason", "a timed frame differs from the verified one"}},
                             state);

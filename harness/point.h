@@ -29,7 +29,7 @@ struct Environment {
   std::string binding = "none";         ///< OMP_PROC_BIND: none, close, spread
   std::string wait_policy = "default";  ///< OMP_WAIT_POLICY: default, active, passive
   std::string runtime =
-      "default";             ///< the OpenMP runtime: default (what the build links), libomp by preloading it
+      "default";             ///< of OpenMP: default (what the build links), libgomp, libomp (preloaded)
   int llvmpipe_threads = 0;  ///< LP_NUM_THREADS, which Mesa reads once per process; 0: no llvmpipe
 
   auto operator<=>(const Environment&) const = default;
@@ -38,7 +38,7 @@ struct Environment {
 /// The known words of each field of Environment.
 inline const std::vector<std::string> kBindings{"none", "close", "spread"};
 inline const std::vector<std::string> kWaitPolicies{"default", "active", "passive"};
-inline const std::vector<std::string> kRuntimes{"default", "libomp"};
+inline const std::vector<std::string> kRuntimes{"default", "libgomp", "libomp"};
 inline const std::vector<std::string> kFillRules{"closed", "top-left"};
 inline const std::vector<std::string> kNearRules{"clip", "off"};
 inline const std::vector<std::string> kCaches{"warm", "cold"};

@@ -184,6 +184,7 @@ Json make_record(const PointState& state, const Study& study, std::optional<doub
   record["hardware"] = state.judgement.is_null() ? Json() : state.judgement.value("hardware", Json());
   record["threads_observed"] =
       state.judgement.is_null() ? Json() : state.judgement.value("threads_observed", Json());
+  record["runtime_observed"] = ok ? state.samples.back().answer.value("runtime_observed", Json()) : Json();
   record["per_thread"] = ok ? per_thread(state) : Json::array();
   record["placement"] = ok ? placement_of(state, topology) : Json();
   if (ok && state.samples.back().answer.contains("counters"))

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
 #include <filesystem>
 #include <iostream>
 
@@ -95,6 +96,7 @@ class Runner {
   Json sample(const Point& point, const std::string& name, int frames) {
     Json answer;
     const auto probe = is_peer(point) ? nullptr : make_execution(point.execution);
+    if (point.execution.backend == "openmp") answer["runtime_observed"] = openmp_runtime();
     if (probe) answer["threads_observed"] = observe_threads(*probe).count;
     const auto renderer = new_renderer(point);
     renderer->draw();
@@ -172,8 +174,9 @@ class Runner {
   std::map<std::string, Scene> scenes_;
 };
 
-/// Where a distribution puts LLVM's OpenMP runtime.
+/// Where RASTERBENCH_LIBOMP says that LLVM's OpenMP runtime is, or where a distribution puts it.
 std::string find_libomp() {
+  if (const char* named = std::getenv("RASTERBENCH_LIBOMP")) return named;
   for (const char* path : {"/usr/lib/x86_64-linux-gnu/libomp.so.5", "/usr/lib/aarch64-linux-gnu/libomp.so.5",
                            "/usr/lib64/libomp.so", "/usr/lib/libomp.so"})
     if (std::filesystem::exists(path)) return path;
@@ -196,10 +199,14 @@ std::map<std::string, std::string> environment_variables(const Environment& envi
     if (const std::string text(*variable); text.starts_with("BENCHMARK_"))
       variables[text.substr(0, text.find('='))] = "";
   if (environment.llvmpipe_threads > 0) variables.merge(llvmpipe_variables(environment.llvmpipe_threads));
-  if (environment.runtime == "libomp") {
+  const std::string own = openmp_runtime();
+  if (environment.runtime == "libgomp" && own != "libgomp")
+    throw InputError(fmt::format("this program runs under {}: libgomp serves programs of gcc only", own));
+  if (environment.runtime == "libomp" && own != "libomp") {  // which has libgomp's interface, too
     const std::string path = find_libomp();
     if (path.empty()) throw InputError("LLVM's OpenMP runtime (libomp) is not installed on this machine");
-    variables["LD_PRELOAD"] = path;
+    const char* others = std::getenv("LD_PRELOAD");
+    variables["LD_PRELOAD"] = others && *others ? path + ":" + others : path;
   }
   return variables;
 }
