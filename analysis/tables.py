@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from . import checks, latex, statistics, steadiness, text
-from .comparison import GROUP_AXES, Analysis, Group, strategy
+from .comparison import EXTRA_AXES, GROUP_AXES, Analysis, Group, strategy
 from .load import Record
 from .statistics import Comparison, Estimate
 
@@ -87,7 +87,8 @@ def points(analysis: Analysis, group: Group) -> Table:
         row: dict[str, Any] = {
             "scene": config.scene, "size": "x".join(map(str, config.size)), "numeric": config.numeric, "kernel": config.kernel,
             "backend": config.backend, "schedule": config.schedule, "chunk": config.chunk, "threads": config.threads,
-            "isa": config.isa, "status": record.status, "reason": record.reason, "id": record.id}
+            **{axis: getattr(config, axis) for axis in EXTRA_AXES}, "runtime_observed": record.raw.get("runtime_observed"),
+            "status": record.status, "reason": record.reason, "id": record.id}
         said = {"kernel": config.kernel, "execution": analysis.execution(record), "threads": str(config.threads)}
         if record.ok:
             comparison = group.comparisons[record.id]

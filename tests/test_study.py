@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import re
 import statistics
@@ -14,7 +15,7 @@ from typing import Any
 import pytest
 from scipy.stats import binom
 
-from .program import CPUS, events, json_lines, read_png, records, run, sampling, snapshot, sweep, write_study
+from .program import CPUS, ROOT, TIMEOUT, environment, events, json_lines, program, read_png, records, run, sampling, snapshot, sweep, write_study
 
 Record = dict[str, Any]
 STAGES = ["clear", "geometry", "raster", "resolve"]
@@ -22,6 +23,8 @@ SMALL = "teapot:triangles=300"
 ISAS = [isa["name"] for isa in json.loads(run("list", "isas", "--json").ok().stdout) if isa["available"]]
 LIBOMP = any(Path(p).exists() for p in ("/usr/lib/x86_64-linux-gnu/libomp.so.5", "/usr/lib/aarch64-linux-gnu/libomp.so.5",
                                         "/usr/lib64/libomp.so", "/usr/lib/libomp.so"))
+OWN_RUNTIME = next(b["runtime"] for b in json.loads(run("list", "backends", "--json").ok().stdout) if b["name"] == "openmp")
+needs_both_runtimes = pytest.mark.skipif(not LIBOMP or OWN_RUNTIME != "libgomp", reason="needs a program of gcc's and LLVM's libomp")
 needs_two_cpus = pytest.mark.skipif(CPUS < 2, reason="this machine has one CPU")
 
 
@@ -86,7 +89,7 @@ CONFIG = {"scene": TEXT, "scene_hash": TEXT, "size": LIST, "kernel": TEXT, "nume
 RECORD = {"schema": WHOLE, "id": TEXT, "name": TEXT, "config": dict, "status": TEXT, "launches": LIST, "blocks": LIST, "frames_per_sample": WHOLE,
           "samples_ms": LIST, "stages_ms": dict, "median_ms": (*NUMBER, NULL), "interval_ms": (LIST, NULL), "p95_ms": (*NUMBER, NULL),
           "min_ms": (*NUMBER, NULL), "max_ms": (*NUMBER, NULL), "floor_ms": (*NUMBER, NULL), "stop": (TEXT, NULL), "verify": (dict, NULL), "work": (dict, NULL), "hardware": (dict, NULL),
-          "threads_observed": (WHOLE, NULL), "per_thread": LIST, "placement": (dict, NULL), "context": TEXT}
+          "threads_observed": (WHOLE, NULL), "runtime_observed": (TEXT, NULL), "per_thread": LIST, "placement": (dict, NULL), "context": TEXT}
 PLACEMENT = {"binding": (TEXT, NULL)} | dict.fromkeys(["migrations", "cpus", "cores", "packages", "numa_nodes", "samples_sharing_cpu", "samples_sharing_core"], WHOLE)
 NOISE = {"windows": WHOLE, "seconds": NUMBER, "other_load_cpus": (dict, TEXT), "steal_share": (dict, TEXT), "load_average": (dict, TEXT),
          "frequency_mhz": (dict, TEXT), "throttled": (*NUMBER, TEXT), "warnings": LIST, "remarks": LIST}
@@ -251,7 +254,7 @@ def test_context_has_the_documented_keys(study: Study) -> None:
     c = study.context
     obey(c, CONTEXT, "context.json")
     obey(c["machine"], MACHINE, "machine")
-    assert {"version", "commit", "dirty", "compiler", "flags", "build_type"} <= set(c["program"]) and isinstance(c["program"]["dirty"], bool)
+    assert {"version", "commit", "dirty", "compiler", "flags", "build_type"} <= set(c["program"]) and c["program"]["fast_math"] is False and isinstance(c["program"]["dirty"], bool)
     assert {"google_benchmark", "tbb", "openmp"} <= set(c["libraries"])
     assert all(set(cache) == {"level", "size_bytes", "shared_by"} for cache in c["machine"]["caches"])
     s = c["study"]
@@ -375,6 +378,54 @@ def test_other_openmp_runtime(mixed: Study) -> None:
     r = mixed.the(runtime="libomp", backend="openmp")
     assert r["status"] == ("ok" if LIBOMP else "skipped")
     assert LIBOMP or "libomp" in r["reason"]
+
+
+@pytest.fixture(scope="module")
+def runtimes(tmp_path_factory: pytest.TempPathFactory) -> Study:
+    """Both runtimes by name, beside what has no part in them."""
+    return Study(tmp_path_factory.mktemp("runtimes"), sampling(6, launches=2),
+                 sweep("row_parallel", ["openmp:static", "openmp:guided,1"], threads=[min(2, CPUS)], runtime=["libgomp", "libomp"]),
+                 sweep("row_parallel", ["serial", "tbb:auto"], threads=[1]))
+
+
+@needs_both_runtimes
+def test_records_say_which_runtime_was_observed(runtimes: Study) -> None:
+    assert runtimes.outcome.code == 0
+    for r in runtimes.where(backend="openmp"):
+        assert r["status"] == "ok" and r["runtime_observed"] == r["config"]["runtime"]
+        assert r["name"].endswith(f"/runtime:{r['config']['runtime']}")
+    assert {r["runtime_observed"] for r in runtimes.where(backend="openmp")} == {"libgomp", "libomp"}
+    assert {r["runtime_observed"] for r in runtimes.records if r["config"]["backend"] != "openmp"} == {None}
+
+
+@needs_both_runtimes
+def test_a_report_tells_the_runtimes_apart(runtimes: Study) -> None:
+    for command in ("table", "report"):
+        done = subprocess.run([str(ROOT / "scripts/python"), "-m", "analysis", command, str(runtimes.folder)], env=environment(),
+                              capture_output=True, text=True, timeout=TIMEOUT, check=False)
+        assert done.returncode == 0, done.stderr
+        (table,) = (runtimes.folder / "tables").glob("points_*.tex") if command == "report" else [None]
+        said = done.stdout if table is None else table.read_text()
+        for schedule in ("static", "guided,1"):
+            for runtime in ("libgomp", "libomp"):
+                assert re.search(f"{schedule}.* runtime {runtime}", said), said
+    (numbers,) = (runtimes.folder / "tables").glob("points_*.csv")
+    with numbers.open() as file:
+        rows = [row for row in csv.DictReader(file) if row["backend"] == "openmp"]
+    assert len(rows) == 4 and all(row["runtime"] == row["runtime_observed"] for row in rows)
+
+
+@needs_both_runtimes
+@pytest.mark.parametrize("instead", ["libgomp", "nothing"])
+def test_a_runtime_that_was_not_observed_fails_the_point(instead: str, tmp_path: Path) -> None:
+    """RASTERBENCH_LIBOMP names a file that is not LLVM's runtime, or none: what runs is libgomp, whatever was asked for."""
+    (library,) = re.findall(r"libgomp\S* => (\S+)", subprocess.run(["ldd", program()], capture_output=True, text=True, check=True).stdout)
+    study = Study(tmp_path, sampling(), sweep("row_parallel", "openmp:static", threads=1, runtime=["libgomp", "libomp"]),
+                  RASTERBENCH_LIBOMP=library if instead == "libgomp" else str(tmp_path / "none.so"))
+    assert study.outcome.code == 1 and study.the(runtime="libgomp")["status"] == "ok"
+    r = study.the(runtime="libomp")
+    assert r["status"] == "failed" and r["reason"] == "libomp was asked for, libgomp ran the loops"
+    assert r["samples_ms"] == [] and r["median_ms"] is None
 
 
 @needs_two_cpus
