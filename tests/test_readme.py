@@ -48,6 +48,14 @@ def speed_of_the_script(words: list[str]) -> list[list[str]]:
     return [*syntax_only(words), ["build/release/bin/rasterbench", "study", "studies/speed.toml", *words[1:], "--dry-run"]]
 
 
+def compilers_of_the_script(words: list[str]) -> list[list[str]]:
+    """The program that is built under two names, a study of seconds, two rounds, in the folder that the README names; what would be built is
+    planned only."""
+    folder = words[words.index("--out") + 1]
+    given = [word for name in ("a", "b") for word in ("--program", f"{name}=build/release/bin/rasterbench")]
+    return [[*words, "--dry-run"], [words[0], *given, "--study", "small.toml", "--rounds", "2", "--out", folder]]
+
+
 def help_only(words: list[str]) -> list[list[str]]:
     """test_invariant0.py runs the script itself on small designs."""
     return [[*words, "--help"]]
@@ -141,6 +149,7 @@ TABLE: list[tuple[str, Shorten]] = [
     (r"scripts/test( .*)?", syntax_only),
     (r"scripts/study( .*)?", study_of_the_script),
     (r"scripts/speed( .*)?", speed_of_the_script),
+    (r"scripts/compilers( .*)?", compilers_of_the_script),
     (r"scripts/invariant0( .*)?", help_only),
     (PRODUCT + r"rasterbench study .*", planned_only),
     (PRODUCT + r"rasterbench machine( .*)?", machine_of_a_small_point),
@@ -150,7 +159,7 @@ TABLE: list[tuple[str, Shorten]] = [
     (PRODUCT + r"rasterbench adopt .*", adoption_of_a_small_picture),
     (PRODUCT + r"rasterbench replay costs.json .*|scripts/python -m analysis whatif costs.json .*", of_small_costs),
     (PRODUCT + r"(rasterbench (render|list|scene|verify|advise|extremes|stability|fuzz|--help|--version)|graphics)\b.*", as_it_stands),
-    (r"scripts/python -m analysis (stability|adopt|trace) .*", as_it_stands),
+    (r"scripts/python -m analysis (stability|adopt|trace|compilers) .*", as_it_stands),
     (r"scripts/python -m analysis report .*", report_of_a_small_study),
     (r"scripts/python -m analysis compare .*", comparison_of_small_studies),
     (r"scripts/python -m analysis selftest .*", as_it_stands),

@@ -22,19 +22,26 @@ OPEN = "promises no bits (-ffast-math)"
 GAP, FOOT_OF_PANEL, HEAD_OF_PANEL = 0.18, 0.42, 0.3
 
 
+# What a panel has one value of, besides its kernel and mode; said in its title where the study has several.
+PANEL_AXES = ("fill", "near", "isa", "tile", "binding", "wait_policy", "runtime", "cache", "generality", "techniques")
+
+
 def draw(found: Comparison) -> Iterator[Drawing]:
-    """One figure a picture; the panels of a picture are its kernels in their modes."""
-    pictures: dict[tuple, dict[tuple[str, str], list[str]]] = {}
+    """One figure a scene and size; its panels are the kernels in their modes, which hold their executions."""
+    varying = {(axis, kernel) for axis in PANEL_AXES for kernel in {p.config.kernel for p in found.points}
+               if len({getattr(p.config, axis) for p in found.points if p.config.kernel == kernel}) > 1}
+    pictures: dict[tuple, dict[str, list[str]]] = {}
     for point in found.points:
         c = point.config
-        pictures.setdefault((c.scene, c.size, c.fill, c.near), {}).setdefault((c.kernel, c.numeric), []).append(point.name)
-    for (scene, size, *_), panels in pictures.items():
+        panel = ", ".join([c.kernel, c.numeric, *(f"{axis} {getattr(c, axis)}" for axis in PANEL_AXES if (axis, c.kernel) in varying)])
+        pictures.setdefault((c.scene, c.size), {}).setdefault(panel, []).append(point.name)
+    for (scene, size), panels in pictures.items():
         title = f"{scene} {size[0]}x{size[1]}"
         name = "compilers_ratio" if len(pictures) == 1 else f"compilers_ratio_{slug(title)}"
         yield _picture(found, panels, title, name)
 
 
-def _picture(found: Comparison, panels: dict[tuple[str, str], list[str]], title: str, name: str) -> Drawing:
+def _picture(found: Comparison, panels: dict[str, list[str]], title: str, name: str) -> Drawing:
     configs = {point.name: point.config for point in found.points}
     executions = list(dict.fromkeys(where(configs[point]) for points in panels.values() for point in points))
     rows = found.configurations
@@ -48,10 +55,10 @@ def _picture(found: Comparison, panels: dict[tuple[str, str], list[str]], title:
     foot = 0.12 + 0.17 * -(-len(keys) // columns)
     height = 0.3 + down * (HEAD_OF_PANEL + tall + FOOT_OF_PANEL) + foot
     figure = style.new_figure(style.FULL_WIDTH, height)
-    for i, ((kernel, numeric), points) in enumerate(panels.items()):
+    for i, (panel, points) in enumerate(panels.items()):
         bottom = foot + (down - 1 - i // PANELS) * (HEAD_OF_PANEL + tall + FOOT_OF_PANEL) + FOOT_OF_PANEL
         axes = style.place(figure, left + (i % PANELS) * (wide + GAP), bottom, wide, tall)
-        axes.set_title(f"{kernel}, {numeric}", loc="left", pad=4)
+        axes.set_title(panel, loc="left", pad=4, fontsize=min(8.5, 8.5 * wide / style.text_width([panel], 8.5)))
         _panel(axes, found, points, configs, executions, labelled=i % PANELS == 0)
     style.title(figure, f"Time over that of {found.base}, {title}", 0.15)
     figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.05 / style.FULL_WIDTH, 0.02 / height), ncol=columns, borderaxespad=0.2,
