@@ -9,8 +9,8 @@ from typing import Any, Iterator
 from . import nodes, severity, statistics, text, weak
 from .comparison import Analysis
 from .contexts import leaves
-from .figures.balance import busy
 from .load import Record, Study
+from .raster_loop import busy
 from .severity import GRAVE, NOTE
 from .statistics import is_close
 

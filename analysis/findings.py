@@ -238,14 +238,14 @@ def stage_share(analysis: Analysis) -> Iterator[Finding]:
 
 
 def balance(analysis: Analysis) -> Iterator[Finding]:
-    """The most uneven sharing; a description, because records hold one busy time a thread and no interval."""
+    """The most uneven sharing; a description, because records hold medians and no interval."""
     found = [(value, r) for r in analysis.study.timed if (value := imbalance(r)) is not None]
     if found:
         value, record = max(found, key=lambda pair: pair[0])
         if value > 1.2:
             yield Finding("balance", 1.0 + min(1.0, value - 1), f"On {where(analysis.group_of(record))} the threads of"
-                          f" {analysis.label(record)} are the least even: the busiest works {value:.2f} times the mean (medians,"
-                          " no interval recorded).")
+                          f" {analysis.label(record)} are the least even: the longest of a sample works {value:.2f} times the mean"
+                          " (medians, no interval recorded).")
 
 
 def untimed(analysis: Analysis) -> Iterator[Finding]:

@@ -11,9 +11,9 @@ import numpy as np
 from scipy import stats
 
 from . import checks, hypotheses, lint_figures, severity, statistics, text, weak
-from .figures.balance import busy
 from .lint import Finding, Folder, Rule
 from .load import Record
+from .raster_loop import busy
 from .severity import GRAVE, NOTE
 from .statistics import is_close, is_number
 

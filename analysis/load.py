@@ -15,6 +15,7 @@ import pandas as pd
 from .statistics import Samples, is_number
 
 SCHEMA = 1
+LOOP_KEYS = ("busy_mean_ms", "busy_longest_ms", "imbalance_ms", "outside_ms")  # of raster_loop; absent in older records
 STAGES = ("clear", "geometry", "raster", "resolve")
 # What tables and plots of accuracy count; null where a mode has none.
 COUNTED = {"wrong", "exact_ties", "edge", "depth", "unexplained", "unbounded", "predicted", "wrong_on_snapped", "worst_distance_px",
@@ -343,6 +344,7 @@ class _Reader:
         per_thread = value.get("per_thread") or []
         if not isinstance(per_thread, list) or any(not isinstance(entry, dict) for entry in per_thread):
             raise self.fail("per_thread", "expected an array of objects")
+        self.raster_loop()
         median = value.get("median_ms")
         recorded = value.get("interval_ms")
         if recorded is not None and not (isinstance(recorded, list) and len(recorded) == 2 and all(map(is_number, recorded))):
@@ -364,6 +366,12 @@ class _Reader:
         if floor is not None and not (is_number(floor) and floor > 0):
             raise self.fail("floor_ms", f"expected a number above 0 or null, found {floor!r}")
         return None if floor is None else float(floor)
+
+    def raster_loop(self) -> None:
+        loop = self.mapping("raster_loop")
+        for key in LOOP_KEYS if self.value.get("raster_loop") is not None else ():
+            if not (is_number(loop.get(key)) and loop[key] >= 0):
+                raise self.fail(f"raster_loop.{key}", f"expected a number that is not below 0, found {loop.get(key)!r}")
 
     def mapping(self, key: str, required: bool = False) -> dict[str, Any]:
         if required and key not in self.value:

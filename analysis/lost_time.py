@@ -2,17 +2,22 @@
 
 P T(P) - T(1) = work inflation + imbalance + dispatch + synchronisation + serial part + other stages + residual
 
-T(1) is the serial backend's frame of the same kernel where the study has it, else the point's own on one thread. Of the raster stage,
-with its time R and busy times b (between the stamps of each loop; the base's with 1, the point's on one thread with s):
+T(1) is the serial backend's frame of the same kernel where the study has it, else the point's own on one thread. Of the raster stage each
+sample has a time R and the busy times of its threads (between the stamps of each loop), of which the longest, the mean b, longest - b and the
+time outside, o = R - longest, are taken within the sample; each term is made of medians of these over the samples (raster_loop.py). The
+base's are marked 1, the point's own on one thread s:
 
-  dispatch          b_s - b_1                       handing out chunks, on one thread; unknown without a serial point
-  work inflation    sum b - b_s                     the same work on P threads: caches, locks, atomics, contended hand-out
-  imbalance         P max b - sum b                 waiting for the longest
-  serial part       (P - 1) (R_1 - b_1)             P - 1 threads have nothing to do outside of loops
-  synchronisation   P (R - max b) - P (R_1 - b_1)   starts and barriers: what lies outside of loops, beyond the serial part
-  other stages      P (T - R) - (T_1 - R_1)         clear, geometry, resolve: no stamps of their own
+  dispatch          b_s - b_1               handing out chunks, on one thread; unknown without a serial point
+  work inflation    P b - b_s               the same work on P threads: caches, locks, atomics, contended hand-out
+  imbalance         P (longest - b)         waiting for the longest
+  serial part       (P - 1) o_1             P - 1 threads have nothing to do outside of loops
+  synchronisation   P (o - o_1)             starts, joins and barriers: time outside of loops beyond that of the base
+  other stages      P (T - R) - (T_1 - R_1) clear, geometry, resolve: no stamps of their own
 
-Without the medians that they are made of, these would close exactly; the residual is what the medians leave, and what lies between stages.
+The residual is measured frame time that none of them holds: what the medians of several quantities leave (they come from different
+samples), time between the stages, what differs between the mean frame of a sample and its last one, which alone is stamped, and busy times
+that exceed their stage, which no time outside can be below 0 for. It cannot show busy times that are wrong within their stage: time that
+the stamps miss is time outside, so what work or imbalance lacks then, synchronisation has too much.
 """
 
 from __future__ import annotations
@@ -22,15 +27,17 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from . import text
+from . import raster_loop, text
 from .comparison import Analysis, Group
 from .load import STAGES, Record
-from .statistics import is_number
+from .raster_loop import RasterLoop
 from .tables import Table
 
 SECTION = "Lost time"
 TERMS = {"inflation": "work inflation", "imbalance": "imbalance", "dispatch": "dispatch", "synchronisation": "synchronisation",
          "serial": "serial part", "others": "other stages", "residual": "residual"}
+RESIDUAL = "The residual is what medians leave, and frame time outside of stages; busy times that are wrong within their stage do not show in it:" \
+           " what they miss is called synchronisation."
 SPLIT = ("isa", "tile", "generality", "techniques", "cache")  # axes that a serial point shares with one that it splits
 
 
@@ -43,6 +50,7 @@ class LostTime:
     total: float  # P T(P)
     useful: float  # T(1)
     terms: dict[str, float | None]
+    per_sample: bool  # else imbalance is that of the threads' medians, of an older record
 
     @property
     def lost(self) -> float:
@@ -53,13 +61,6 @@ class LostTime:
         return self.base.config.backend == "serial"
 
 
-def busy(record: Record) -> list[float]:
-    """Busy milliseconds of each thread of the raster stage; empty where they were not recorded."""
-    times = [entry.get("busy_ms") for entry in record.per_thread]
-    known = len(times) == record.config.threads and all(is_number(t) and t >= 0 for t in times) and sum(times) > 0
-    return [float(t) for t in times] if known else []
-
-
 def stage(record: Record, name: str) -> float:
     values = record.stages.get(name)
     return 0.0 if values is None else float(np.median(values))
@@ -67,30 +68,38 @@ def stage(record: Record, name: str) -> float:
 
 def serial_of(group: Group, record: Record) -> Record | None:
     config = record.config
-    return next((r for r in group.timed if r.config.backend == "serial" and r.config.kernel == config.kernel and busy(r) and "raster" in r.stages
+    return next((r for r in group.timed if r.config.backend == "serial" and r.config.kernel == config.kernel and _loop(r)
                  and all(getattr(r.config, axis) == getattr(config, axis) for axis in SPLIT)), None)
+
+
+def _loop(record: Record) -> RasterLoop | None:
+    """None also where there is no raster stage to set the busy times against."""
+    loop = raster_loop.of(record)
+    return None if loop is None or loop.outside is None or "raster" not in record.stages else loop
 
 
 def lost_time(analysis: Analysis, group: Group, record: Record) -> LostTime | None:
     """None where the point has one thread, no stamps, or no point on one thread."""
     alone = analysis.thread_base[record.id]
-    if record.config.threads == 1 or alone is None or not all(busy(r) and "raster" in r.stages for r in (record, alone)):
+    if record.config.threads == 1 or alone is None:
         return None
     serial = serial_of(group, record)
     base = serial or alone
-    threads, own = record.config.threads, busy(record)
+    own, of_alone, of_base = (_loop(r) for r in (record, alone, base))
+    if own is None or of_alone is None or of_base is None:
+        return None
+    threads = record.config.threads
     medians = {r.id: float(np.median(r.samples.values)) for r in (record, base)}
-    longest, outside = max(own), stage(base, "raster") - busy(base)[0]
     terms: dict[str, float | None] = {
-        "inflation": sum(own) - busy(alone)[0],
-        "imbalance": threads * longest - sum(own),
-        "dispatch": busy(alone)[0] - busy(serial)[0] if serial else None,
-        "synchronisation": threads * (stage(record, "raster") - longest - outside),
-        "serial": (threads - 1) * outside,
+        "inflation": threads * own.mean - of_alone.mean,
+        "imbalance": threads * own.imbalance,
+        "dispatch": of_alone.mean - of_base.mean if serial else None,
+        "synchronisation": threads * (own.outside - of_base.outside),
+        "serial": (threads - 1) * of_base.outside,
         "others": sum(threads * stage(record, name) - stage(base, name) for name in STAGES if name != "raster")}
     total, useful = threads * medians[record.id], medians[base.id]
     terms["residual"] = total - useful - sum(term for term in terms.values() if term is not None)
-    return LostTime(record, base, total, useful, terms)
+    return LostTime(record, base, total, useful, terms, own.per_sample)
 
 
 def lost_times(analysis: Analysis, group: Group) -> list[LostTime]:
@@ -98,14 +107,15 @@ def lost_times(analysis: Analysis, group: Group) -> list[LostTime]:
 
 
 def tables(analysis: Analysis) -> list[Table]:
-    numbers, words = [], []
+    numbers, words, older = [], [], 0
     for group in analysis.groups:
         for one in lost_times(analysis, group):
+            older += not one.per_sample
             head = {"scene": group.title, "kernel": one.record.config.kernel, "execution": analysis.execution(one.record),
                     "threads": one.record.config.threads}
             of = {"P T(P)": one.total, "T(1)": one.useful, "lost": one.lost} | {TERMS[name]: term for name, term in one.terms.items()}
             numbers.append(head | {"total_ms": one.total, "base_ms": one.useful, "lost_ms": one.lost}
-                           | {f"{name}_ms": term for name, term in one.terms.items()} | {"base": one.base.name})
+                           | {f"{name}_ms": term for name, term in one.terms.items()} | {"base": one.base.name, "per_sample": one.per_sample})
             words.append(head | {name: text.number(value) for name, value in of.items()}
                          | {"base": "serial" if one.over_serial else "itself, 1 thread"})
     if not numbers:
@@ -115,8 +125,13 @@ def tables(analysis: Analysis) -> list[Table]:
     return [Table("lost_time", "Lost time of each point",
                   "Milliseconds of thread time: P T(P) - T(1) and the terms that add up to it, of medians; analysis/lost_time.py has their"
                   " formulas. Work inflation holds waiting for locks and atomics, and contended hand-out; a negative term is time that"
-                  f" several threads save. Medians have no interval here: a term below the noise of the samples is none.{split}",
+                  f" several threads save. {RESIDUAL} Medians have no interval here: a term below the noise of the samples is none.{split}"
+                  f"{older_remark(older)}",
                   pd.DataFrame(numbers), pd.DataFrame(words), section=SECTION, folded=len(words) > 16)]
+
+
+def older_remark(count: int) -> str:
+    return f" Of {text.count(count, 'point')} imbalance is {raster_loop.REMARK}." if count else ""
 
 
 def worst_residual(found: list[LostTime]) -> float:

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "base/error.h"
 #include "base/hash.h"
@@ -39,6 +40,33 @@ Json per_thread(const PointState& state) {
                        {"migrations", migrations_of(state, worker)}});
   }
   return threads;
+}
+
+/// How the raster stage was shared, within each sample and then as medians: the longest thread of a frame may
+/// be another one in the next. Null where no thread of a loop is known (peers).
+Json raster_loop(const PointState& state) {
+  std::vector<double> mean, longest, imbalance, outside;
+  for (const Sample& sample : state.samples) {
+    const Json& threads = sample.answer.at("per_thread");
+    if (threads.empty()) return {};
+    double sum = 0, most = 0, least_idle = std::numeric_limits<double>::infinity();
+    for (const Json& thread : threads) {
+      const double busy = thread.at("busy_ms");
+      sum += busy;
+      most = std::max(most, busy);
+      least_idle = std::min(least_idle, thread.at("idle_ms").get<double>());
+    }
+    mean.push_back(
+        std::min(most, sum / static_cast<double>(threads.size())));  // no mean is above, but for rounding
+    longest.push_back(most);
+    imbalance.push_back(most - mean.back());
+    outside.push_back(least_idle);
+  }
+  if (mean.empty()) return {};
+  return {{"busy_mean_ms", median(mean)},
+          {"busy_longest_ms", median(longest)},
+          {"imbalance_ms", median(imbalance)},
+          {"outside_ms", median(outside)}};
 }
 
 /// What decides how points are sampled; the time limit is not in it, so that --resume may give more time.
@@ -187,6 +215,7 @@ Json make_record(const PointState& state, const Study& study, std::optional<doub
   record["runtime_observed"] = ok ? state.samples.back().answer.value("runtime_observed", Json()) : Json();
   record["per_thread"] = ok ? per_thread(state) : Json::array();
   record["placement"] = ok ? placement_of(state, topology) : Json();
+  record["raster_loop"] = ok ? raster_loop(state) : Json();
   if (ok && state.samples.back().answer.contains("counters"))
     record["counters"] = state.samples.back().answer.at("counters");
   record["context"] = context_id;

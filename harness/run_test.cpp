@@ -73,6 +73,35 @@ TEST_F(RunTest, RecordHoldsTheSamples) {
   EXPECT_EQ(record.at("id").get<std::string>().size(), 32u);
 }
 
+/// Two threads take turns at being the longest: the medians of the threads are even, no frame is.
+TEST_F(RunTest, RasterLoopIsSharedWithinEachSample) {
+  apply_event(verify(), states_[0]);
+  for (int i = 0; i < 8; ++i) {
+    Json event = sample(i, 12);
+    Json thread{{"busy_ms", 10}, {"idle_ms", 1}, {"iterations", 4}, {"chunks", 2}, {"cpu", 0}},
+        other = thread;
+    other["busy_ms"] = 5;
+    other["idle_ms"] = 6;
+    event["answer"]["per_thread"] = i % 2 == 0 ? Json{thread, other} : Json{other, thread};
+    apply_event(event, states_[0]);
+  }
+  const Json record = make_record(states_[0], study_, 1.5, "context");
+  EXPECT_EQ(record.at("per_thread").at(0).at("busy_ms"), record.at("per_thread").at(1).at("busy_ms"));
+  EXPECT_EQ(
+      record.at("raster_loop"),
+      (Json{{"busy_mean_ms", 7.5}, {"busy_longest_ms", 10.0}, {"imbalance_ms", 2.5}, {"outside_ms", 1.0}}));
+}
+
+/// Three times 0.1 over three is more than 0.1.
+TEST_F(RunTest, RasterLoopIsNeverLessThanEven) {
+  apply_event(verify(), states_[0]);
+  Json event = sample(0, 0.2);
+  const Json thread = event.at("answer").at("per_thread").at(0);
+  event["answer"]["per_thread"] = Json{thread, thread, thread};
+  apply_event(event, states_[0]);
+  EXPECT_EQ(make_record(states_[0], study_, 1.5, "c").at("raster_loop").at("imbalance_ms"), 0.0);
+}
+
 TEST_F(RunTest, FailureHidesTheSpeed) {
   apply_event(verify(), states_[0]);
   apply_event(sample(0, 1), states_[0]);
@@ -83,6 +112,7 @@ TEST_F(RunTest, FailureHidesTheSpeed) {
   EXPECT_TRUE(record.at("samples_ms").empty());
   EXPECT_TRUE(record.at("median_ms").is_null());
   EXPECT_TRUE(record.at("floor_ms").is_null());
+  EXPECT_TRUE(record.at("raster_loop").is_null());
   EXPECT_EQ(summary_table(states_).find("1.000"), std::string::npos);
 }
 

@@ -89,7 +89,7 @@ CONFIG = {"scene": TEXT, "scene_hash": TEXT, "size": LIST, "kernel": TEXT, "nume
 RECORD = {"schema": WHOLE, "id": TEXT, "name": TEXT, "config": dict, "status": TEXT, "launches": LIST, "blocks": LIST, "frames_per_sample": WHOLE,
           "samples_ms": LIST, "stages_ms": dict, "median_ms": (*NUMBER, NULL), "interval_ms": (LIST, NULL), "p95_ms": (*NUMBER, NULL),
           "min_ms": (*NUMBER, NULL), "max_ms": (*NUMBER, NULL), "floor_ms": (*NUMBER, NULL), "stop": (TEXT, NULL), "verify": (dict, NULL), "work": (dict, NULL), "hardware": (dict, NULL),
-          "threads_observed": (WHOLE, NULL), "runtime_observed": (TEXT, NULL), "per_thread": LIST, "placement": (dict, NULL), "context": TEXT}
+          "threads_observed": (WHOLE, NULL), "runtime_observed": (TEXT, NULL), "per_thread": LIST, "raster_loop": (dict, NULL), "placement": (dict, NULL), "context": TEXT}
 PLACEMENT = {"binding": (TEXT, NULL)} | dict.fromkeys(["migrations", "cpus", "cores", "packages", "numa_nodes", "samples_sharing_cpu", "samples_sharing_core"], WHOLE)
 NOISE = {"windows": WHOLE, "seconds": NUMBER, "other_load_cpus": (dict, TEXT), "steal_share": (dict, TEXT), "load_average": (dict, TEXT),
          "frequency_mhz": (dict, TEXT), "throttled": (*NUMBER, TEXT), "warnings": LIST, "remarks": LIST}
@@ -245,6 +245,8 @@ def test_good_points_are_verified(study: Study) -> None:
         assert 0 < w["drawn"] <= w["triangles"] and w["fragments_tested"] >= w["fragments_covered"] >= w["covered_pixels"] > 100 and w["bytes"] > 0
         assert w["drawn"] + sum(w["rejected"].values()) == w["triangles"]
         assert r["threads_observed"] == r["config"]["threads"] == len(r["per_thread"])
+        assert set(r["raster_loop"]) == {"busy_mean_ms", "busy_longest_ms", "imbalance_ms", "outside_ms"} and min(r["raster_loop"].values()) >= 0
+        assert r["raster_loop"]["busy_longest_ms"] >= r["raster_loop"]["busy_mean_ms"]
         for worker in r["per_thread"]:
             assert set(worker) == {"busy_ms", "idle_ms", "iterations", "chunks", "cpu", "cpus", "migrations"}
             assert min(worker["busy_ms"], worker["idle_ms"]) >= 0 and 0 <= worker["chunks"] <= worker["iterations"]

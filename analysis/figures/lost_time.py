@@ -75,7 +75,8 @@ def _draw(analysis: Analysis, group: Group) -> Iterator[Drawing]:
                  " point's own on one thread, and then dispatch is not told from the work.",
                  f"Bars are of medians ({analysis.sampled([one.record for one in on_page])} samples), without intervals; the largest residual is"
                  f" {100 * lost_time.worst_residual(on_page):.1f} % of P T(P).",
-                 "Work inflation holds waiting for locks and atomics, and contended hand-out; terms below 0 save time and stand left of it."]
+                 "Work inflation holds waiting for locks and atomics, and contended hand-out; terms below 0 save time and stand left of it.",
+                 lost_time.RESIDUAL + lost_time.older_remark(sum(not one.per_sample for one in on_page))]
         if not complete:
             notes.append("Of each kernel and backend only the fastest execution is drawn; tables/lost_time.csv has all.")
         caption = captions.build(

@@ -9,9 +9,11 @@ from typing import Any, Callable
 import pytest
 
 from .. import lost_time, report
+from ..figures import balance
 from ..figures.lost_time import draw, shares
+from ..load import InputError
 from .conftest import analyse
-from .synthetic import plan, write
+from .synthetic import loop_of, plan, write
 
 MakeStudy = Callable[..., Path]
 
@@ -28,6 +30,7 @@ def set_times(directory: Path, times: Callable[[dict[str, Any]], tuple[float, li
             value["samples_ms"] = [raster + others] * n
             value["stages_ms"] = {"clear": [others / 4] * n, "geometry": [others / 2] * n, "raster": [raster] * n, "resolve": [others / 4] * n}
             value["per_thread"] = [{"busy_ms": b, "iterations": 10, "cpu": i} for i, b in enumerate(busy)]
+            value["raster_loop"] = loop_of(busy, raster)
         lines.append(json.dumps(value))
     (directory / "records.jsonl").write_text("\n".join(lines) + "\n")
 
@@ -77,6 +80,64 @@ def test_residual_is_what_the_stages_leave(study: MakeStudy) -> None:
     one = found(directory)
     assert one.total == 40 and one.terms["residual"] == pytest.approx(2)
     assert lost_time.worst_residual([one]) == pytest.approx(0.05)
+
+
+def edit(directory: Path, change: Callable[[dict[str, Any]], None]) -> None:
+    values = [json.loads(line) for line in (directory / "records.jsonl").read_text().splitlines()]
+    for value in values:
+        change(value)
+    (directory / "records.jsonl").write_text("\n".join(map(json.dumps, values)) + "\n")
+
+
+def alternating(value: dict[str, Any]) -> None:
+    """Frames of (10, 5) and (5, 10) ms busy: the medians of the threads are even, no frame is."""
+    if value["config"]["threads"] == 2:
+        value["per_thread"] = [{"busy_ms": 7.5, "iterations": 10, "cpu": i} for i in range(2)]
+        value["raster_loop"] = {"busy_mean_ms": 7.5, "busy_longest_ms": 10.0, "imbalance_ms": 2.5, "outside_ms": 5.0}
+
+
+def test_imbalance_is_that_of_the_samples_and_not_of_the_medians(study: MakeStudy) -> None:
+    directory = study(kernels=["tile_parallel"])
+    set_times(directory, known)
+    edit(directory, alternating)
+    one = found(directory)
+    assert one.terms["imbalance"] == 5 and one.terms["inflation"] == -4 and one.terms["residual"] == pytest.approx(0)
+    assert balance.imbalance(one.record) == pytest.approx(10 / 7.5)
+    assert "older version" not in lost_time.tables(analyse(directory))[0].note
+
+
+def test_older_records_are_said_to_have_medians_of_threads(study: MakeStudy) -> None:
+    directory = study(kernels=["tile_parallel"])
+    set_times(directory, known)
+    edit(directory, lambda value: value.pop("raster_loop", None))
+    one = found(directory)
+    assert not one.per_sample and one.terms["imbalance"] == 3 and one.terms["synchronisation"] == 2
+    assert "older version" in lost_time.tables(analyse(directory))[0].note
+    analysis = analyse(directory)
+    for drawings in (list(draw(analysis)), list(balance.draw(analysis))):
+        assert drawings and all("older version" in d.caption.body for d in drawings)
+
+
+def test_synchronisation_is_what_the_samples_say_and_not_the_remainder(study: MakeStudy) -> None:
+    """Else the residual would be 0 whatever the busy times are."""
+    directory = study(kernels=["tile_parallel"])
+    set_times(directory, known)
+
+    def beyond(value: dict[str, Any]) -> None:
+        if value["config"]["threads"] == 2:  # busier than the stage is long: nothing can lie outside
+            value["raster_loop"] = loop_of([18.0, 18.0], 15.0)
+
+    edit(directory, beyond)
+    one = found(directory)
+    assert one.terms["synchronisation"] == -4 and one.terms["residual"] == pytest.approx(-6)
+
+
+@pytest.mark.parametrize("loop", [{}, {"busy_mean_ms": 1}, [1], {"busy_mean_ms": 1, "busy_longest_ms": -1, "imbalance_ms": 0, "outside_ms": 0}])
+def test_a_bad_raster_loop_is_named(study: MakeStudy, loop: Any) -> None:
+    directory = study(kernels=["tile_parallel"])
+    edit(directory, lambda value: value.update(raster_loop=loop))
+    with pytest.raises(InputError, match="records.jsonl:1.*raster_loop"):
+        analyse(directory)
 
 
 @pytest.mark.parametrize("without", ["one thread", "stamps"])

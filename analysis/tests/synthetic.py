@@ -105,7 +105,15 @@ def record(p: Plan, config: dict[str, Any], rng: np.random.Generator, drift: np.
         "threads_observed": config["threads"],
         "per_thread": [{"busy_ms": b, "iterations": 100, "cpu": i, "cpus": {str(i): n}, "migrations": 0} for i, b in enumerate(busy)],
         "placement": {"binding": None if config["backend"] == "serial" else "kept", "migrations": 0, "cpus": config["threads"], "cores": config["threads"],
-                      "packages": 1, "numa_nodes": 1, "samples_sharing_cpu": 0, "samples_sharing_core": 0}, "context": context}
+                      "packages": 1, "numa_nodes": 1, "samples_sharing_cpu": 0, "samples_sharing_core": 0},
+        "raster_loop": loop_of(busy, base * 0.76), "context": context}
+
+
+def loop_of(busy: list[float], raster: np.ndarray | float) -> dict[str, float]:
+    """raster_loop of samples that all have these busy times."""
+    longest, mean = max(busy), min(max(busy), sum(busy) / len(busy))
+    return {"busy_mean_ms": mean, "busy_longest_ms": longest, "imbalance_ms": longest - mean,
+            "outside_ms": max(0.0, float(np.median(raster)) - longest)}
 
 
 def statistics_stages() -> tuple[str, ...]:
@@ -123,7 +131,7 @@ def name(config: dict[str, Any]) -> str:
 def withhold(entry: dict[str, Any], status: str, reason: str) -> None:
     """Turns a timed record into one that has no times."""
     entry.update(status=status, reason=reason, samples_ms=[], launches=[], blocks=[], median_ms=None, interval_ms=None,
-                 p95_ms=None, min_ms=None, max_ms=None, stop=None, per_thread=[], threads_observed=None,
+                 p95_ms=None, min_ms=None, max_ms=None, stop=None, per_thread=[], raster_loop=None, threads_observed=None,
                  stages_ms={stage: None for stage in statistics_stages()})
 
 
