@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Sequence
 
 import numpy as np
+from scipy import stats
 
 from . import contexts, google_benchmark, statistics, text
 from .load import InputError, Record, load
@@ -211,8 +212,11 @@ def _row(name: str, a: Samples, b: Samples, tested: tuple[Estimate, float, str],
 
 def common_shift(outcome: Outcome) -> float | None:
     """The median ratio of all points, where nearly all moved to the same side: what the whole machine did, or a change that
-    is everywhere. None where they moved apart."""
+    is everywhere. None where they moved apart, or are so few that a sign test cannot tell (fewer than six)."""
     values = np.array([row.ratio.value for row in outcome.rows if row.ratio is not None])
-    if not len(values) or max(np.mean(values > 1), np.mean(values < 1)) < COMMON_SHIFT_SHARE:
+    if not len(values):
+        return None
+    most = int(max(np.sum(values > 1), np.sum(values < 1)))
+    if most < COMMON_SHIFT_SHARE * len(values) or stats.binomtest(most, len(values)).pvalue >= 1 - statistics.CONFIDENCE:
         return None
     return float(np.median(values))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -90,6 +91,12 @@ def test_quiet_equal_runs_are_the_same(tmp_path):
     assert {row.verdict for row in rows.values()} == {"SLOWER"}
     assert compare.common_shift(outcome) == pytest.approx(1.01, abs=0.003)
     assert "every point moved" in comparison_output.plain(outcome)
+
+
+@pytest.mark.parametrize("ratios, shift", [([1.1] * 5, None), ([1.1] * 6, 1.1), ([1.1] * 7 + [0.9] * 3, None), ([0.9] * 19 + [1.1], 0.9), ([], None)])
+def test_a_common_shift_takes_a_sign_test(ratios, shift):
+    rows = [SimpleNamespace(ratio=SimpleNamespace(value=ratio)) for ratio in ratios] + [SimpleNamespace(ratio=None)]
+    assert compare.common_shift(SimpleNamespace(rows=rows)) == shift
 
 
 def test_wide_intervals_are_ambiguous(tmp_path):
