@@ -97,7 +97,7 @@ def parser() -> Parser:
                                 description="Writes FOLDER/gantt, thread_shares and, where the trace has a heat map, cost, each as .png, .svg and"
                                             " .pdf, their captions.txt, and threads.csv and .tex, then prints the table of the threads.")
     trace.add_argument("file", metavar="FILE", type=Path, help="a trace of `rasterbench trace` (trace.json)")
-    trace.add_argument("-o", "--out", metavar="FOLDER", type=Path, help="where to write (default: the folder of FILE)")
+    trace.add_argument("-o", "--out", metavar="FOLDER", type=Path, help="where to write (default: figures/ beside FILE)")
     whatif = commands.add_parser("whatif", help="predict schedules and chunks for 1 to 1024 threads from traced costs",
                                  description="Simulates each schedule and chunk on the costs of a loop's iterations, contention-free, for 1 to"
                                              " 1024 threads; writes figures, tables and text to FOLDER and prints the answers for 16 and 64 threads.")
@@ -153,7 +153,7 @@ def main(arguments: list[str] | None = None) -> int:
             from . import trace
 
             traced = trace.read(options.file)
-            written = trace.write(traced, options.out or options.file.parent)
+            written = trace.write(traced, options.out or options.file.parent / "figures")
             print(trace.plain(traced))
             print(f"written: {', '.join(map(str, written))}")
             return 0

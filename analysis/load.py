@@ -25,6 +25,10 @@ TECHNIQUES = ("fragments", "blocks", "front_to_back", "streaming", "huge_pages")
 PEERS = ("llvmpipe",)  # other programs that draw the same pictures; as a record's backend
 
 
+MOST_THREADS = 65536  # of any file: beyond it arrays of one entry a thread are a mistake, not a machine
+MOST_CHUNK = 2**30
+
+
 class InputError(Exception):
     """Bad input, as one line that names the file, the place and the field."""
 
@@ -166,6 +170,16 @@ class Study:
 
 def is_whole(value: object) -> bool:
     return isinstance(value, int) and not isinstance(value, bool) and value > 0
+
+
+def is_thread_count(value: object) -> bool:
+    return is_whole(value) and value <= MOST_THREADS
+
+
+def chunk_of(word: str) -> int | None:
+    """The chunk that a schedule's text ends in, or None where it is no number from 1 to MOST_CHUNK."""
+    good = word.isascii() and word.isdecimal() and len(word) <= len(str(MOST_CHUNK)) and 1 <= int(word) <= MOST_CHUNK
+    return int(word) if good else None
 
 
 def technique_set(words: str) -> frozenset[str]:

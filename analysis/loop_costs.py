@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -9,9 +10,11 @@ from typing import Any
 import numpy as np
 
 from . import load
-from .load import InputError, is_whole
+from .load import InputError, is_thread_count, is_whole
 from .statistics import is_number
 
+# Axes of a point that decide what an iteration costs, beside those that name the loop; a study's points must have the same.
+AXES = ("scene_hash", "fill", "near", "isa", "techniques", "generality")
 UNITS = ("row", "tile", "triangle", "pixel")
 MOST_ITERATIONS = 100_000_000  # beyond it the arrays of the simulation do not fit in common memory
 
@@ -29,7 +32,8 @@ class LoopCosts:
     threads: int  # that dispatch was measured on
     costs: np.ndarray
     serial: float | None  # the loop on one thread, without stamps
-    dispatch: dict[str, float]  # "openmp:dynamic,1" -> a chunk's overhead
+    dispatch: dict[str, float | None]  # "openmp:dynamic,1" -> a chunk's overhead; None: not beyond the noise
+    axes: dict[str, str | None] = field(default_factory=dict)  # by AXES; None: of an older version, which did not write it
     block: int = 1  # iterations that share a cost in the file, and were given equal parts of it
     raw: dict[str, Any] = field(repr=False, default_factory=dict)
 
@@ -60,13 +64,13 @@ class LoopCosts:
         """The measured overhead of a chunk and the name that it was measured under: the schedule's own with this chunk, else with
         the nearest chunk by ratio, else 0 and "not measured"."""
         wanted = f"{backend}:{schedule}" + ("" if chunk is None else f",{chunk}")
-        if wanted in self.dispatch:
-            return self.dispatch[wanted], wanted
+        if (found := self.dispatch.get(wanted)) is not None:
+            return found, wanted
         known = {}
-        for name in self.dispatch:
-            kind, _, own = name.partition(",")
-            if kind == f"{backend}:{schedule}" and (not own or own.isdigit()):
-                known[name] = int(own or 0)
+        for name, cost in self.dispatch.items():
+            kind, comma, own = name.partition(",")
+            if cost is not None and kind == f"{backend}:{schedule}" and (not comma or load.chunk_of(own)):
+                known[name] = load.chunk_of(own) or 0
         if chunk is not None and any(known.values()):
             # A default chunk may be n / threads, whose overhead is another thing: only where nothing else was measured.
             nearest = min((n for n in known if known[n]), key=lambda n: abs(np.log(chunk / known[n])))
@@ -86,14 +90,20 @@ def read(path: Path) -> LoopCosts:
         found = repr(value[key]) if key in value else ""
         return InputError(path, f"expected {expected}, found {found[:60]}" if found else "missing", None, key)
 
+    if value.get("schema") != load.SCHEMA:
+        raise fail("schema", f"{load.SCHEMA}")
     if value.get("unit") not in UNITS:
         raise fail("unit", f"one of {', '.join(UNITS)}")
     for key in ("kernel", "numeric"):
         if not isinstance(value.get(key), str) or not value[key]:
             raise fail(key, "text")
-    for key in ("iterations", "threads"):
-        if not is_whole(value.get(key)):
-            raise fail(key, "a whole number above 0")
+    if not is_whole(value.get("iterations")):
+        raise fail("iterations", "a whole number above 0")
+    if not is_thread_count(value.get("threads")):
+        raise fail("threads", f"a whole number from 1 to {load.MOST_THREADS}")
+    for key in (*AXES, "model"):
+        if value.get(key) is not None and not (isinstance(value[key], str) and value[key]):
+            raise fail(key, "text")
     size, tile = value.get("size"), value.get("tile")
     if not (isinstance(size, list) and len(size) == 2 and all(map(is_whole, size))):
         raise fail("size", "[width, height]")
@@ -109,6 +119,8 @@ def read(path: Path) -> LoopCosts:
         raise fail("cost_us", "numbers that are not below 0")
     if len(costs) != -(-n // block):
         raise InputError(path, f"holds {len(costs)} costs, expected {-(-n // block)} of {n} iterations", None, "cost_us")
+    if not math.isfinite(sum(map(float, costs))):
+        raise InputError(path, "adds up to infinity", None, "cost_us")
     if not any(costs):
         raise InputError(path, "every iteration costs 0", None, "cost_us")
     serial, dispatch = value.get("serial_us"), value.get("dispatch_us", {})
@@ -117,11 +129,12 @@ def read(path: Path) -> LoopCosts:
     if not isinstance(dispatch, dict):
         raise fail("dispatch_us", "an object")
     for name, cost in dispatch.items():
-        if not (is_number(cost) and cost >= 0):
-            raise InputError(path, f"expected a number that is not below 0, found {cost!r}", None, f"dispatch_us.{name}")
+        if cost is not None and not (is_number(cost) and cost >= 0):
+            raise InputError(path, f"expected a number that is not below 0, or null, found {cost!r}", None, f"dispatch_us.{name}")
     return LoopCosts(path, value["unit"], value["kernel"], value["numeric"], tuple(size), tile, value["threads"],
                      _spread(np.array(costs, dtype=float), n, block), None if serial is None else float(serial),
-                     {name: float(cost) for name, cost in dispatch.items()}, block,
+                     {name: None if cost is None else float(cost) for name, cost in dispatch.items()},
+                     {key: value.get(key) for key in AXES}, block,
                      {key: v for key, v in value.items() if key != "cost_us"})
 
 

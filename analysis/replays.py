@@ -10,10 +10,11 @@ import numpy as np
 import pandas as pd
 
 from . import load, schedule_model, text, work_stealing
-from .load import InputError, is_whole
+from .load import InputError, is_thread_count, is_whole
 from .statistics import is_number
 from .tables import Table
 
+CONTRADICTIONS = ("contradiction", "order_contradiction")  # of a repetition: the first iteration that is one, or null
 DRAWS = 21  # simulations of a work-stealing loop, whose victims are random
 
 
@@ -22,6 +23,7 @@ class Repetition:
     measured: float  # milliseconds
     slept: np.ndarray  # milliseconds of each iteration
     workers: np.ndarray  # who ran each
+    contradicted: bool  # who ran what, or the order of the starts, is not what the rule allows
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,7 @@ class Replay:
     runtime: str
     threads: int
     repetitions: list[Repetition]
+    can_be_contradicted: bool  # by who ran what: chunks of one iteration fit any worker
 
     @property
     def name(self) -> str:
@@ -45,6 +48,11 @@ class Replay:
             return schedule_model.simulate(prefix, self.schedule, self.runtime, self.threads, self.chunk, 0.0).time
         run = work_stealing.auto if self.schedule == "auto" else work_stealing.simple
         return float(np.median([run(prefix, self.threads, self.chunk or 1, 0.0, 0.0, seed).time for seed in range(DRAWS)]))
+
+    @property
+    def contradicted(self) -> int:
+        """Repetitions that contradict the rule."""
+        return sum(r.contradicted for r in self.repetitions)
 
     @property
     def errors(self) -> list[float]:
@@ -66,18 +74,36 @@ def read(path: Path) -> Replay:
     expect(backend == "openmp" and schedule in ("static", "dynamic", "guided") or backend == "tbb" and schedule in ("auto", "simple"),
            "execution", "a schedule that has a model: openmp static, dynamic, guided, tbb auto, simple")
     expect(backend == "tbb" or value.get("runtime") in schedule_model.RUNTIMES, "runtime", " or ".join(schedule_model.RUNTIMES))
-    for key in ("threads", "iterations"):
-        expect(is_whole(value.get(key)), key, "a whole number above 0")
+    expect(not rest.partition(",")[1] or load.chunk_of(chunk) is not None, "execution", f"a chunk from 1 to {load.MOST_CHUNK}")
+    expect(is_thread_count(value.get("threads")), "threads", f"a whole number from 1 to {load.MOST_THREADS}")
+    expect(is_whole(value.get("iterations")), "iterations", "a whole number above 0")
     runs = value.get("repetitions")
     expect(isinstance(runs, list) and len(runs) > 0 and all(_is_repetition(run, value["iterations"]) for run in runs), "repetitions",
-           "objects with measured_ms, and slept_ms and workers of each iteration")
-    return Replay(path, backend, schedule, int(chunk) if chunk else None, value.get("runtime"), value["threads"],
-                  [Repetition(float(r["measured_ms"]), np.array(r["slept_ms"], dtype=float), np.array(r["workers"], dtype=int)) for r in runs])
+           "objects with measured_ms, contradiction (an iteration or null), and slept_ms and workers of each iteration")
+    return Replay(path, backend, schedule, load.chunk_of(chunk) if chunk else None, value.get("runtime"), value["threads"],
+                  [Repetition(float(r["measured_ms"]), np.array(r["slept_ms"], dtype=float), np.array(r["workers"], dtype=int),
+                              any(r.get(key) is not None for key in CONTRADICTIONS)) for r in runs], value.get("can_be_contradicted") is True)
 
 
 def _is_repetition(run: Any, n: int) -> bool:
-    return isinstance(run, dict) and is_number(run.get("measured_ms")) and run["measured_ms"] > 0 and all(
+    return isinstance(run, dict) and is_number(run.get("measured_ms")) and run["measured_ms"] > 0 and "contradiction" in run and all(
+        run.get(key) is None or (isinstance(run[key], int) and not isinstance(run[key], bool) and 0 <= run[key] < n) for key in CONTRADICTIONS) and all(
         isinstance(run.get(key), list) and len(run[key]) == n and all(map(is_number, run[key])) for key in ("slept_ms", "workers"))
+
+
+def _verdict(replay: Replay) -> str:
+    if replay.contradicted:
+        return f"CONTRADICTED by {replay.contradicted} of {len(replay.repetitions)}"
+    if replay.backend != "openmp":
+        return "random, not checked"
+    return "not contradicted" if replay.can_be_contradicted else "cannot be contradicted"
+
+
+def warnings(found: list[Replay]) -> list[str]:
+    """A line for each replay that contradicts the rule by which it was simulated."""
+    return [f"The replay of {replay.name} on {text.count(replay.threads, 'thread')} ({replay.path.name}) CONTRADICTS the rule of {replay.runtime} in"
+            f" {replay.contradicted} of {text.count(len(replay.repetitions), 'repetition')}: predictions by this rule do not hold for it."
+            for replay in found if replay.contradicted]
 
 
 def table(found: list[Replay]) -> Table:
@@ -86,10 +112,12 @@ def table(found: list[Replay]) -> Table:
         errors = replay.errors
         measured = float(np.median([r.measured for r in replay.repetitions]))
         numbers.append({"schedule": replay.name, "runtime": replay.runtime, "threads": replay.threads, "repetitions": len(errors),
-                        "measured_ms": measured, "error": float(np.median(errors)), "least_error": min(errors), "largest_error": max(errors)})
+                        "measured_ms": measured, "error": float(np.median(errors)), "least_error": min(errors), "largest_error": max(errors),
+                        "contradicted": replay.contradicted, "can_be_contradicted": replay.can_be_contradicted})
         words.append({"schedule": replay.name, "runtime": replay.runtime, "threads": str(replay.threads), "measured ms": text.number(measured),
                       "error": f"{100 * np.median(errors):+.2f} %", "errors": f"{100 * min(errors):+.2f} to {100 * max(errors):+.2f} %",
-                      "n": str(len(errors))})
+                      "n": str(len(errors)), "rule": _verdict(replay)})
     return Table("whatif_replay", "Sleep replay", "The iterations as sleeps in the real runtime, against the simulation of its rule on the durations"
-                 " that were slept: what is left is the error of the rule (median over the repetitions; steals are random).",
+                 " that were slept: what is left is the error of the rule (median over the repetitions; steals are random). CONTRADICTED: that many"
+                 " repetitions did not follow the rule, and their error is none of it; cannot be contradicted: only the order of the starts was checked.",
                  pd.DataFrame(numbers), pd.DataFrame(words))

@@ -16,12 +16,13 @@ import pandas as pd
 from matplotlib.image import imread
 
 from . import load, sidecars, style, text, writing
-from .load import InputError, is_whole
+from .load import InputError, is_thread_count, is_whole
 from .statistics import is_number
 from .tables import Table
 
-SHARES = {"chunks": "in chunks", "between": "between chunks: handing out, and the trace's stamps",
-          "before": "before the first chunk", "after": "after the last chunk: waiting for the others"}
+SHARES = {"before": "before the first chunk", "chunks": "in chunks", "between": "between chunks: handing out, and the trace's stamps",
+          "after": "after the last chunk: waiting for the others", "none": "loops without a chunk of the thread", "outside": "between loops"}
+ROUNDING = 0.01  # microseconds: stamps in the file have three digits behind the point
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,11 @@ class Trace:
         return float(self.metadata["loop_begin_us"]), float(self.metadata["loop_end_us"])
 
     @property
+    def loops(self) -> np.ndarray:
+        """Begin and end of each loop, us."""
+        return np.array(self.metadata.get("loop_spans_us") or [self.span], dtype=float)
+
+    @property
     def execution(self) -> str:
         m = self.metadata
         chunk = "" if m["chunk"] is None else f",{m['chunk']}"
@@ -78,19 +84,54 @@ def read(path: Path) -> Trace:
     for key in ("model", "kernel", "numeric", "backend", "unit", "runtime", "cpu", "chunks_found_by"):
         if not isinstance(metadata.get(key), str):
             raise InputError(path, "expected text", None, f"metadata.{key}")
-    for key in ("threads", "loops"):
+    for key in ("loops", "iterations"):
         if not is_whole(metadata.get(key)):
             raise InputError(path, "expected a whole number above 0", None, f"metadata.{key}")
+    if not is_thread_count(metadata.get("threads")):
+        raise InputError(path, f"expected a whole number from 1 to {load.MOST_THREADS}", None, "metadata.threads")
     for key in ("frame_us", "untraced_frame_us", "loop_begin_us", "loop_end_us", "loop_us"):
         if not (is_number(metadata.get(key)) and metadata[key] >= 0):
             raise InputError(path, "expected a number that is not below 0", None, f"metadata.{key}")
     for key in ("schedule", "chunk"):
         if key not in metadata:
             raise InputError(path, "missing", None, f"metadata.{key}")
-    return Trace(path, metadata, _chunks(path, value.get("traceEvents"), metadata["threads"]), _image(path, metadata.get("image")))
+    if metadata["loop_end_us"] <= metadata["loop_begin_us"]:
+        raise InputError(path, "is not after loop_begin_us", None, "metadata.loop_end_us")
+    if not (metadata["chunk"] is None or is_whole(metadata["chunk"])):
+        raise InputError(path, "expected a whole number above 0 or null", None, "metadata.chunk")
+    if not (metadata["schedule"] is None or isinstance(metadata["schedule"], str)):
+        raise InputError(path, "expected text or null", None, "metadata.schedule")
+    _check_loops(path, metadata)
+    found = Trace(path, metadata, _chunks(path, value.get("traceEvents"), metadata), _image(path, metadata.get("image")))
+    outside = _outside(found)
+    if outside is not None:
+        raise InputError(path, f"holds a chunk of thread {outside} that is not within its loop", None, "traceEvents")
+    return found
 
 
-def _chunks(path: Path, events: Any, threads: int) -> pd.DataFrame:
+def _check_loops(path: Path, metadata: dict[str, Any]) -> None:
+    spans = metadata.get("loop_spans_us")
+    if spans is None and metadata["loops"] == 1:
+        return
+    if spans is None:
+        raise InputError(path, "missing: a trace of several loops by an older version, trace again", None, "metadata.loop_spans_us")
+    good = isinstance(spans, list) and len(spans) == metadata["loops"] and all(
+        isinstance(span, list) and len(span) == 2 and all(map(is_number, span)) and span[0] <= span[1] for span in spans)
+    if not good or any(before[1] > after[0] + ROUNDING for before, after in zip(spans, spans[1:])) or not (
+            abs(spans[0][0] - metadata["loop_begin_us"]) <= ROUNDING and abs(spans[-1][1] - metadata["loop_end_us"]) <= ROUNDING):
+        raise InputError(path, f"expected [begin, end] of {metadata['loops']} loops in order, from loop_begin_us to loop_end_us", None,
+                         "metadata.loop_spans_us")
+
+
+def _outside(trace: Trace) -> int | None:
+    """The thread of the first chunk that is not within its loop."""
+    chunks, spans = trace.chunks, trace.loops[trace.chunks["loop"].to_numpy()]
+    bad = (chunks["begin"].to_numpy() < spans[:, 0] - ROUNDING) | (chunks["end"].to_numpy() > spans[:, 1] + ROUNDING)
+    return int(chunks["thread"].to_numpy()[bad][0]) if bad.any() else None
+
+
+def _chunks(path: Path, events: Any, metadata: dict[str, Any]) -> pd.DataFrame:
+    threads, loops, iterations = (metadata[key] for key in ("threads", "loops", "iterations"))
     if not isinstance(events, list):
         raise InputError(path, "expected an array", None, "traceEvents")
     rows = []
@@ -110,11 +151,18 @@ def _chunks(path: Path, events: Any, threads: int) -> pd.DataFrame:
                 raise InputError(path, f"expected a number that is not below 0, found {number!r}", None, f"{place}.{key}")
         if not (isinstance(numbers["tid"], int) and numbers["tid"] < threads):
             raise InputError(path, f"is {numbers['tid']!r}, there are {text.count(threads, 'thread')}", None, f"{place}.tid")
+        whole = {key: arguments.get(key, standard) for key, standard in (("first", None), ("last", None), ("loop", 0))}
+        for key, number in whole.items():
+            if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < (loops if key == "loop" else iterations):
+                raise InputError(path, f"is {number!r}, there are {loops if key == 'loop' else iterations}", None, f"{place}.{key}")
         if numbers["last"] < numbers["first"]:
             raise InputError(path, "last is below first", None, f"{place}.args")
+        many = {"iterations": arguments.get("iterations", numbers["last"] - numbers["first"] + 1), "chunks": arguments.get("chunks", 1)}
+        for key, number in many.items():
+            if not is_whole(number) or number > numbers["last"] - numbers["first"] + 1:
+                raise InputError(path, f"is {number!r}, of {numbers['last'] - numbers['first'] + 1} iterations", None, f"{place}.args.{key}")
         rows.append((numbers["tid"], numbers["ts"], numbers["ts"] + numbers["dur"], numbers["first"], numbers["last"],
-                     arguments.get("iterations", numbers["last"] - numbers["first"] + 1), arguments.get("loop", 0),
-                     arguments.get("chunks", 1)))
+                     many["iterations"], whole["loop"], many["chunks"]))
     if not rows:
         raise InputError(path, "holds no chunk", None, "traceEvents")
     frame = pd.DataFrame(rows, columns=["thread", "begin", "end", "first", "last", "iterations", "loop", "chunks"])
@@ -148,22 +196,35 @@ def _image(path: Path, said: Any) -> CostImage | None:
 def threads_table(trace: Trace) -> Table:
     """One row a thread: what it ran, and how the time of the loop divides for it."""
     begin, end = trace.span
-    rows = []
-    for thread in range(trace.threads):
-        own = trace.chunks[trace.chunks["thread"] == thread]
-        busy = float((own["end"] - own["begin"]).sum())
-        first, last = (float(own["begin"].iloc[0]), float(own["end"].iloc[-1])) if len(own) else (end, end)
-        longest = float((own["end"] - own["begin"]).max()) if len(own) else 0.0
-        rows.append({"thread": thread, "chunks": int(own["chunks"].sum()), "iterations": int(own["iterations"].sum()), "chunks_us": busy,
-                     "between_us": max(0.0, last - first - busy), "before_us": first - begin, "after_us": end - last,
-                     "longest_event_us": longest})
-    numbers = pd.DataFrame(rows)
-    words = pd.DataFrame([{"thread": r["thread"], "chunks": r["chunks"], "iterations": r["iterations"],
-                           **{f"{name} (µs)": f"{r[f'{name}_us']:.1f}" for name in SHARES},
-                           "longest (µs)": f"{r['longest_event_us']:.1f}"} for r in rows])
+    spans, all_loops = trace.loops, float((trace.loops[:, 1] - trace.loops[:, 0]).sum())
+    chunks = trace.chunks.assign(busy=trace.chunks["end"] - trace.chunks["begin"])
+    # Of each loop on its own: a thread is before its first chunk once a loop, not once a frame.
+    by_loop = chunks.groupby(["thread", "loop"], sort=True).agg(first=("begin", "min"), last=("end", "max"), busy=("busy", "sum")).reset_index()
+    of = spans[by_loop["loop"].to_numpy()]
+    by_loop["length"] = of[:, 1] - of[:, 0]
+    by_loop["before"] = (by_loop["first"] - of[:, 0]).clip(lower=0)
+    by_loop["after"] = (of[:, 1] - by_loop["last"]).clip(lower=0)
+    by_loop["between"] = (by_loop["last"] - by_loop["first"] - by_loop["busy"]).clip(lower=0)
+    sums = by_loop.groupby("thread")[["before", "after", "between", "length"]].sum()
+    counts = chunks.groupby("thread").agg(chunks=("chunks", "sum"), iterations=("iterations", "sum"), busy=("busy", "sum"), longest=("busy", "max"))
+    every = range(trace.threads)
+    sums, counts = sums.reindex(every, fill_value=0.0), counts.reindex(every, fill_value=0)
+    numbers = pd.DataFrame({
+        "thread": every, "chunks": counts["chunks"].astype(int), "iterations": counts["iterations"].astype(int), "chunks_us": counts["busy"].astype(float),
+        "between_us": sums["between"], "before_us": sums["before"], "after_us": sums["after"], "none_us": (all_loops - sums["length"]).clip(lower=0),
+        "outside_us": end - begin - all_loops, "longest_event_us": counts["longest"].astype(float)})
+    shown = shares(numbers)
+    words = pd.DataFrame([{"thread": r.thread, "chunks": r.chunks, "iterations": r.iterations,
+                           **{f"{name} (µs)": f"{getattr(r, f'{name}_us'):.1f}" for name in shown},
+                           "longest (µs)": f"{r.longest_event_us:.1f}"} for r in numbers.itertuples()])
     loops = text.count(trace.metadata["loops"], "loop")
     note = f"From the begin of the first of {loops} to the end of the last one; chunks: {trace.metadata['chunks_found_by']}."
     return Table("threads", f"Time of the threads, {trace.title}", note, numbers, words)
+
+
+def shares(threads: pd.DataFrame) -> list[str]:
+    """The shares that are shown: what no thread has in a trace of one loop is left out."""
+    return [name for name in SHARES if name not in ("none", "outside") or threads[f"{name}_us"].max() > ROUNDING]
 
 
 def plain(trace: Trace) -> str:
@@ -190,7 +251,5 @@ def write(trace: Trace, folder: Path) -> list[Path]:
             files |= sidecars.files(drawing, *sidecars.drawn_from(trace.path, folder))
             captions += f"{drawing.name}: {drawing.caption.plain} {drawing.caption.reading}\n\n"
     files["captions.txt"] = captions
-    writing.refuse_inputs((folder / name for name in files), [trace.path, *([trace.image.path] if trace.image else [])])
-    for name, content in files.items():
-        writing.write(folder / name, content)
+    writing.write_folder(folder, files, "trace", [trace.path, *([trace.image.path] if trace.image else [])])
     return [folder / name for name in sorted(files)]

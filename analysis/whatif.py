@@ -6,7 +6,7 @@ chunk. So it bounds the speedup of the loop's schedule from above, up to the noi
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Sequence
 
@@ -27,6 +27,8 @@ CAVEAT = "Predictions are contention-free"
 THREADS = tuple(2**k for k in range(11))
 ASKED = (16, 64)  # which schedule and chunk is best here
 TIE = 0.01  # predictions within this share of the best are ties: the costs are not known better
+CONDITIONS = ("output", "cache", "binding", "wait_policy")  # of a run: a point is compared with one thread under the same
+SERIES = (*CONDITIONS, "runtime")  # points that differ in one of them are no series
 FINE = 100_000  # iterations up to which every power of two is a chunk, and steals are drawn three times
 SEEDS = 3
 
@@ -129,7 +131,12 @@ class Measured:
     record: Record
     prediction: Prediction
     time: Estimate  # milliseconds
-    speedup: Estimate | None  # over the same kernel on one thread
+    speedup: Estimate | None  # over the same kernel on one thread, under the same conditions
+    condition: str = ""  # its further axes, where points of the study differ in them
+
+    @property
+    def name(self) -> str:
+        return self.prediction.name + self.condition
 
     @property
     def error(self) -> float:
@@ -148,28 +155,43 @@ class Comparison:
 
 
 def measured(model: Model, directory: Path, scene: str | None) -> Comparison:
-    """The study's points of the same kernel, numeric mode, size and tile. Throws InputError if there are none, or of several scenes."""
+    """The study's points of the same loop on the same scene. Raises InputError if there are none, or if they differ in an axis that decides
+    what an iteration costs."""
     study, costs = load.load(directory), model.costs
-    mine = [r for r in study.timed if (r.config.kernel, r.config.numeric, r.config.size) == (costs.kernel, costs.numeric, costs.size)
+    for axis, value in costs.axes.items():
+        if value is None:
+            raise InputError(costs.path, "missing, as in traces of older versions: trace again to compare with a study", None, axis)
+    named = [r for r in study.timed if (r.config.kernel, r.config.numeric, r.config.size) == (costs.kernel, costs.numeric, costs.size)
             and (costs.tile is None or str(r.config.tile) == str(costs.tile)) and (scene is None or r.config.scene == scene)]
-    if not mine:
+    if not named:
         raise InputError(directory / "records.jsonl", f"holds no timed point of {costs.name}" + (f" and scene {scene}" if scene else ""))
+    mine = [r for r in named if all(getattr(r.config, axis) == value for axis, value in costs.axes.items())]
+    if not mine:
+        # The axis that fewest points have as the costs do is the one to name.
+        axis = min(costs.axes, key=lambda a: sum(getattr(r.config, a) == costs.axes[a] for r in named))
+        found = sorted({str(getattr(r.config, axis)) for r in named})
+        raise InputError(directory / "records.jsonl", f"is {text.listing(found, 4)}, {costs.path.name} has {costs.axes[axis]}: no point of {costs.name} is of"
+                         " the traced loop", None, f"config.{axis}")
     scenes = sorted({r.config.scene for r in mine})
     if len(scenes) > 1:
         raise InputError(directory / "records.jsonl", f"holds {', '.join(scenes)}: name one with --scene", None, "config.scene")
     points, left_out = [], 0
-    base = _one_thread(mine)
     for record in mine:
         rule, stage = _rule(record), _stage(record)
         if rule is None or stage is None:
             left_out += 1
             continue
         chunk = record.config.chunk if record.config.chunk is not None or rule.schedule == "static" else 1
+        base = _one_thread([r for r in mine if all(getattr(r.config, axis) == getattr(record.config, axis) for axis in CONDITIONS)])
         points.append(Measured(record, model.predict(rule, chunk, record.config.threads), statistics.median_estimate(stage),
                                None if base is None else statistics.ratio(base, stage)))
+    # The runtime of a backend is its own: only where one backend has several does it tell points apart.
+    varied = [axis for axis in SERIES if any(len({getattr(p.record.config, axis) for p in points if p.record.config.backend == backend}) > 1
+                                             for backend in {p.record.config.backend for p in points})]
+    points = [replace(p, condition="".join(f", {axis.replace('_', ' ')} {getattr(p.record.config, axis)}" for axis in varied)) for p in points]
     series: dict[str, list[Measured]] = {}
     for point in points:
-        series.setdefault(point.prediction.name, []).append(point)
+        series.setdefault(point.name, []).append(point)
     fits = {name: [scaling_laws.fit(law, [p.prediction.threads for p in of], [p.time.value for p in of]) for law in scaling_laws.LAWS]
             for name, of in series.items()}
     return Comparison(study, Analysis(study).machine, scenes[0], points, left_out, fits)
@@ -231,13 +253,13 @@ def answers_table(model: Model, asked: Sequence[int] = ASKED) -> Table:
 
 def measured_table(found: Comparison) -> Table:
     numbers, words = [], []
-    for p in sorted(found.points, key=lambda p: (p.prediction.threads, p.prediction.name)):
+    for p in sorted(found.points, key=lambda p: (p.prediction.threads, p.name)):
         s = p.speedup
-        numbers.append({"schedule": p.prediction.name, "threads": p.prediction.threads, "predicted_ms": p.prediction.outcome.time / 1e3,
+        numbers.append({"schedule": p.name, "threads": p.prediction.threads, "predicted_ms": p.prediction.outcome.time / 1e3,
                         "measured_ms": p.time.value, "measured_low": p.time.low, "measured_high": p.time.high, "error": p.error,
                         "predicted_speedup": p.prediction.speedup, "speedup": s and s.value, "speedup_low": s and s.low,
                         "speedup_high": s and s.high, "n": p.time.n})
-        words.append({"threads": str(p.prediction.threads), "schedule": p.prediction.name,
+        words.append({"threads": str(p.prediction.threads), "schedule": p.name,
                       "predicted ms": text.number(p.prediction.outcome.time / 1e3),
                       "measured ms": text.estimate(p.time.value, p.time.low, p.time.high), "error": f"{100 * p.error:+.1f} %",
                       "predicted speedup": text.number(p.prediction.speedup),
@@ -292,6 +314,12 @@ def cautions(model: Model) -> list[str]:
     unknown = [rule.name for rule in RULES if costs.overhead(rule.backend, rule.schedule, None)[1] == "not measured"]
     if unknown:
         lines.append(f"No overhead of a chunk was measured for {text.listing(unknown, 6)}: 0 stands for it.")
+    dispatch = f"The overhead of a chunk was measured on {text.count(costs.threads, 'thread')}"
+    if costs.threads == 1:
+        lines.append(f"{dispatch}, where nobody contends for the next chunk: on more threads it costs several times that, so small chunks look better than"
+                     " they are. Trace with --threads as many as there are CPUs.")
+    else:
+        lines.append(f"{dispatch}; with more, more contend for the next chunk.")
     if costs.block > 1:
         lines.append(f"Each {costs.block} consecutive iterations share one traced cost: smaller chunks look more even than they are.")
     if model.steal is None:
@@ -319,7 +347,8 @@ def write(path: Path, folder: Path, study: Path | None = None, scene: str | None
     model = Model(read(path), steal)
     found = None if study is None else measured(model, study, scene)
     made = [answers_table(model), predictions_table(model)] + ([measured_table(found), fits_table(found)] if found and found.points else [])
-    made += [replays.table([replays.read(file) for file in replayed])] if replayed else []
+    slept = [replays.read(file) for file in replayed]
+    made += [replays.table(slept)] if slept else []
     files: dict[str, str | bytes] = {}
     with matplotlib.rc_context(style.RC):
         for drawn in (drawing.curves(model, found), drawing.heat_map(model)):
@@ -327,7 +356,7 @@ def write(path: Path, folder: Path, study: Path | None = None, scene: str | None
             files[f"{drawn.name}.txt"] = f"{drawn.caption.plain}\n{drawn.caption.reading}\n"
     for table in made:
         files |= {f"{table.name}.csv": table.csv(), f"{table.name}.tex": table.tex()}
-    lines = findings(model, found)
+    lines = [*findings(model, found), *replays.warnings(slept)]
     said = "\n".join([*lines, "", *(f"{table.title}. {table.note}\n{plain(table)}\n" for table in made)])
     files["whatif.txt"] = said
     writing.write_folder(folder, files, "whatif", [path, *replayed, *([study / "records.jsonl"] if study else [])])

@@ -6,9 +6,11 @@
 #include <cmath>
 #include <limits>
 
+#include "base/buffer.h"
 #include "base/error.h"
 #include "build_info.h"
 #include "harness/context.h"
+#include "harness/replay.h"
 #include "harness/statistics.h"
 #include "harness/verify.h"
 #include "kernels/kernel.h"
@@ -33,14 +35,23 @@ double loop_seconds(const LoopTrace& trace) {
   return sum;
 }
 
-/// Index of the value that has as many below it as above (the lower one of two).
-std::size_t median_index(const std::vector<double>& values) {
-  std::vector<std::size_t> order(values.size());
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-  const auto middle = order.begin() + static_cast<std::ptrdiff_t>((order.size() - 1) / 2);
-  std::nth_element(order.begin(), middle, order.end(),
-                   [&](std::size_t a, std::size_t b) { return values[a] < values[b]; });
+/// The value that has as many below it as above (the lower one of two).
+double lower_median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
+  std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+std::size_t chunks_in(const TracedFrame& frame) {
+  std::size_t sum = 0;
+  for (const auto& of_worker : frame.chunks) sum += of_worker.size();
+  return sum;
+}
+
+double loop_seconds(const TracedFrame& frame) {
+  double sum = 0;
+  for (const TracedLoop& loop : frame.loops) sum += loop.end - loop.begin;
+  return sum;
 }
 
 /// Microseconds with four digits behind the point: a clock has no more.
@@ -98,23 +109,56 @@ std::vector<Joined> join(const std::vector<TracedChunk>& chunks, std::int64_t to
   return joined;
 }
 
-/// Seconds of loop(n) with an empty body: the shortest of many, since other load only lengthens it.
-double empty_loop_seconds(Execution& execution, std::int64_t n) {
-  constexpr int kRepetitions = 31;
-  double shortest = std::numeric_limits<double>::infinity();
+/// A loop with an empty body: the shortest of several, since other load only lengthens it.
+struct EmptyLoop {
+  double seconds = std::numeric_limits<double>::infinity();
+  double chunks = 0;
+};
+
+/// Empty where no repetition counts. oneTBB may leave a worker out, which is then no loop of so many threads;
+/// OpenMP's threads take part in every one, if only in its barrier.
+std::optional<EmptyLoop> time_empty_loop(Execution& execution, std::int64_t n) {
+  constexpr int kRepetitions = 9;
+  std::optional<EmptyLoop> shortest;
   for (int repetition = 0; repetition < kRepetitions; ++repetition) {
     execution.reset_tally();
     const double begin = LoopTrace::now();
     execution.loop(n, [](std::int64_t, int) {});
-    shortest = std::min(shortest, LoopTrace::now() - begin);
+    const double seconds = LoopTrace::now() - begin;
+    double chunks = 0;
+    bool has_idle = false;
+    for (const WorkerTally& tally : execution.tally()) {
+      chunks += static_cast<double>(tally.chunks);
+      has_idle = has_idle || tally.chunks == 0;
+    }
+    if (execution.config().backend == "tbb" && has_idle) continue;
+    if (!shortest || seconds < shortest->seconds) shortest = {seconds, chunks};
   }
   return shortest;
 }
 
-double chunks_of(const Execution& execution) {
-  std::int64_t sum = 0;
-  for (const WorkerTally& tally : execution.tally()) sum += tally.chunks;
-  return static_cast<double>(sum);
+/// Chunks of a loop: by the rule of the OpenMP runtime where it is known, else as they were seen.
+double chunks_of(const ExecutionConfig& config, std::int64_t n, const EmptyLoop& seen) {
+  const auto borders = chunk_borders(config, openmp_runtime(), n);
+  return borders.empty() ? seen.chunks : static_cast<double>(borders.size() - 1);
+}
+
+/// One round of measuring a schedule; fields are empty where the loop did not run on all threads.
+struct EmptyLoops {
+  std::optional<double> start, further;  // seconds of the short loop, and of the long one beyond it
+  double chunks = 0;                     // of the long one beyond the short one
+};
+
+EmptyLoops time_empty_loops(Execution& execution, std::int64_t n) {
+  const ExecutionConfig& config = execution.config();
+  const std::int64_t least = std::int64_t{config.threads} * config.chunk.value_or(1);
+  const auto start = time_empty_loop(execution, least), whole = time_empty_loop(execution, n);
+  EmptyLoops loops;
+  if (start) loops.start = start->seconds;
+  if (!start || !whole) return loops;
+  loops.further = whole->seconds - start->seconds;
+  loops.chunks = chunks_of(config, n, *whole) - chunks_of(config, least, *start);
+  return loops;
 }
 
 }  // namespace
@@ -153,25 +197,60 @@ TracedFrame trace_frames(const Point& point, const Scene& scene, int frames) {
     result.untraced_seconds = median(seconds);
     picture = picture_hash(*untraced);
   }
+  {
+    LoopTrace loops(LoopTrace::Detail::kLoops);
+    traced_renderer(point, scene, point.execution, &loops)->draw();
+    if (loops.loops().empty()) throw Error(fmt::format("{} has no loop to trace", point.kernel));
+    std::size_t iterations = 0;
+    for (const TracedLoop& loop : loops.loops()) iterations += static_cast<std::size_t>(loop.iterations);
+    checked_bytes(iterations, 3 * sizeof(TracedChunk),
+                  "the chunks of a traced frame");  // the trace's, two kept
+    // A chunk belongs to one loop, so that no more of them can be joined than a loop has.
+    if (const std::size_t least = loops.loops().size() * static_cast<std::size_t>(point.execution.threads);
+        loops.loops().size() > 1 && least > kMostEvents)
+      throw InputError(
+          {.field = "--kernel"},
+          fmt::format("{} runs {} loops in a frame: a trace holds at most {} on {} threads", point.kernel,
+                      loops.loops().size(), kMostEvents / static_cast<std::size_t>(point.execution.threads),
+                      point.execution.threads));
+  }
   LoopTrace trace(LoopTrace::Detail::kChunks);
   const auto renderer = traced_renderer(point, scene, point.execution, &trace);
   renderer->draw();  // makes room for the chunks of the others
-  std::vector<double> seconds;
-  std::vector<TracedFrame> traced;
+  FramesNearMedian kept;
   for (int frame = 0; frame < frames; ++frame) {
     trace.clear();
-    TracedFrame& taken = traced.emplace_back();
+    TracedFrame taken;
     taken.begin = LoopTrace::now();
     taken.seconds = renderer->draw().seconds.total();
+    taken.untraced_seconds = result.untraced_seconds;
     taken.loops = trace.loops();
     taken.chunks = trace.chunks();
-    seconds.push_back(loop_seconds(trace));
+    kept.add(std::move(taken));
   }
-  if (trace.loops().empty()) throw Error(fmt::format("{} has no loop to trace", point.kernel));
   if (picture_hash(*renderer) != picture) throw Error("the traced frame differs from the others");
-  TracedFrame& chosen = traced[median_index(seconds)];
-  chosen.untraced_seconds = result.untraced_seconds;
-  return std::move(chosen);
+  return kept.take();
+}
+
+void FramesNearMedian::add(TracedFrame frame) {
+  seconds_.push_back(loop_seconds(frame));
+  bytes_ += chunks_in(frame) * sizeof(TracedChunk);
+  kept_.push_back(std::move(frame));
+  const double middle = lower_median(seconds_);
+  while (kept_.size() > kMostFrames || (kept_.size() > 1 && bytes_ > kMostBytes)) {
+    const auto farthest = std::max_element(kept_.begin(), kept_.end(), [&](const auto& a, const auto& b) {
+      return std::abs(loop_seconds(a) - middle) < std::abs(loop_seconds(b) - middle);
+    });
+    bytes_ -= chunks_in(*farthest) * sizeof(TracedChunk);
+    kept_.erase(farthest);
+  }
+}
+
+TracedFrame FramesNearMedian::take() {
+  const double middle = lower_median(seconds_);
+  return std::move(*std::min_element(kept_.begin(), kept_.end(), [&](const auto& a, const auto& b) {
+    return std::abs(loop_seconds(a) - middle) < std::abs(loop_seconds(b) - middle);
+  }));
 }
 
 LoopCosts measure_loop_costs(const Point& point, const Scene& scene, int frames) {
@@ -217,32 +296,45 @@ LoopCosts measure_loop_costs(const Point& point, const Scene& scene, int frames)
   return costs;
 }
 
+std::optional<double> beyond_noise(const std::vector<double>& rounds) {
+  constexpr std::size_t kLeastRounds = 7;
+  constexpr double kTimesTheNoise = 4, kErrorOfMedian = 1.2533, kDeviationOfMad = 1.4826;
+  if (rounds.size() < kLeastRounds) return {};
+  const double middle = median(rounds);
+  std::vector<double> distances;
+  for (const double value : rounds) distances.push_back(std::abs(value - middle));
+  const double noise =
+      kErrorOfMedian * kDeviationOfMad * median(distances) / std::sqrt(static_cast<double>(rounds.size()));
+  return middle > kTimesTheNoise * noise ? std::optional(middle) : std::nullopt;
+}
+
 std::map<std::string, ScheduleCost> measure_schedules(int threads) {
   constexpr std::int64_t kIterations = 1 << 14;
+  constexpr int kMostRounds = 25;
   std::map<std::string, ScheduleCost> costs;
-  struct Times {
-    double start, whole, chunks;  // chunks: those of the whole loop beyond those of its start
-  };
-  const auto measure = [&](const ExecutionConfig& config) {
-    const auto execution = make_execution(config);
-    Times times;
-    times.start = empty_loop_seconds(*execution, std::int64_t{threads} * config.chunk.value_or(1));
-    times.chunks = -chunks_of(*execution);
-    times.whole = empty_loop_seconds(*execution, kIterations);
-    times.chunks += chunks_of(*execution);
-    return times;
-  };
   for (const Schedule& schedule : schedules()) {
     if (schedule.backend == "serial") continue;
     // The same loop with one chunk a thread: what the iterations themselves cost.
-    const Times even = measure({schedule.backend, "static", {}, threads, nullptr});
+    const auto even = make_execution({schedule.backend, "static", {}, threads, nullptr});
     for (const std::optional<int> chunk :
          {std::optional<int>(), std::optional<int>(1), std::optional<int>(16)}) {
       if (chunk && schedule.chunk.empty()) continue;
       const ExecutionConfig config{schedule.backend, schedule.name, chunk, threads, nullptr};
-      const Times times = measure(config);
-      const double spent = threads * ((times.whole - times.start) - (even.whole - even.start));
-      costs[to_string(config)] = {times.start, times.chunks > 0 ? std::max(0.0, spent / times.chunks) : 0.0};
+      const auto execution = make_execution(config);
+      ScheduleCost& cost = costs[to_string(config)];
+      std::vector<double> rounds;  // seconds of a chunk
+      for (int round = 0; round < kMostRounds && !cost.chunk_seconds; ++round) {
+        const EmptyLoops of_even = time_empty_loops(*even, kIterations),
+                         own = time_empty_loops(*execution, kIterations);
+        if (own.start) cost.start_seconds = std::min(*own.start, cost.start_seconds.value_or(*own.start));
+        if (!of_even.further || !own.further) continue;
+        if (own.chunks <= 0) {
+          cost.chunk_seconds = 0;  // more iterations make no more chunks
+          break;
+        }
+        rounds.push_back(threads * (*own.further - *of_even.further) / own.chunks);
+        cost.chunk_seconds = beyond_noise(rounds);
+      }
     }
   }
   return costs;
@@ -250,8 +342,7 @@ std::map<std::string, ScheduleCost> measure_schedules(int threads) {
 
 std::string trace_text(const Point& point, const LoopShape& shape, const TracedFrame& frame,
                        const Json& image) {
-  std::size_t total = 0;
-  for (const auto& of_worker : frame.chunks) total += of_worker.size();
+  const std::size_t total = chunks_in(frame);
   const auto together =
       static_cast<std::int64_t>(std::max<std::size_t>(1, (total + kMostEvents - 1) / kMostEvents));
   const auto us = [&](double seconds) { return 1e6 * (seconds - frame.begin); };
@@ -275,10 +366,10 @@ std::string trace_text(const Point& point, const LoopShape& shape, const TracedF
       text += "}}";
     }
   std::int64_t iterations = 0;
-  double loops = 0;
+  Json spans = Json::array();
   for (const TracedLoop& loop : frame.loops) {
     iterations += loop.iterations;
-    loops += loop.end - loop.begin;
+    spans.push_back({rounded_us(loop.begin - frame.begin), rounded_us(loop.end - frame.begin)});
   }
   namespace info = build_info;
   const ExecutionConfig& execution = point.execution;
@@ -304,7 +395,8 @@ std::string trace_text(const Point& point, const LoopShape& shape, const TracedF
                 {"loops", frame.loops.size()},
                 {"loop_begin_us", rounded_us(frame.loops.front().begin - frame.begin)},
                 {"loop_end_us", rounded_us(frame.loops.back().end - frame.begin)},
-                {"loop_us", rounded_us(loops)},
+                {"loop_us", rounded_us(loop_seconds(frame))},
+                {"loop_spans_us", frame.loops.size() > 1 ? spans : Json()},
                 {"chunks", total},
                 {"chunks_an_event", together},
                 {"chunks_found_by", chunks_found_by(execution)},
@@ -313,8 +405,8 @@ std::string trace_text(const Point& point, const LoopShape& shape, const TracedF
   return text + "\n],\n\"metadata\":" + dump(metadata) + "}\n";
 }
 
-std::string costs_text(const Point& point, const LoopShape& shape, const LoopCosts& costs,
-                       const std::map<std::string, ScheduleCost>& schedules) {
+std::string costs_text(const Point& point, const std::string& scene_hash, const LoopShape& shape,
+                       const LoopCosts& costs, const std::map<std::string, ScheduleCost>& schedules) {
   const std::size_t n = costs.seconds.size(),
                     block = std::max<std::size_t>(1, (n + kMostCosts - 1) / kMostCosts);
   std::string list;
@@ -332,15 +424,22 @@ std::string costs_text(const Point& point, const LoopShape& shape, const LoopCos
             {"size", {point.width, point.height}},
             {"kernel", point.kernel},
             {"numeric", point.numeric},
+            {"model", point.scene.model},
+            {"scene_hash", scene_hash},
             {"schedule", to_string(point.execution)},
             {"threads", point.execution.threads},
             {"runtime", runtime_of(point.execution)},
             {"cpu", cpu_model()},
             {"stamp_us", rounded_us(costs.stamp_seconds)},
             {"serial_us", rounded_us(costs.serial_loop_seconds)}};
+  const Json config = point_config(point);
+  for (const char* axis : {"fill", "near", "isa", "techniques", "generality"}) head[axis] = config.at(axis);
+  const auto us_or_null = [](const std::optional<double>& seconds) {
+    return seconds ? Json(rounded_us(*seconds)) : Json();
+  };
   for (const auto& [schedule, cost] : schedules) {
-    head["dispatch_us"][schedule] = rounded_us(cost.chunk_seconds);
-    head["start_us"][schedule] = rounded_us(cost.start_seconds);
+    head["dispatch_us"][schedule] = us_or_null(cost.chunk_seconds);
+    head["start_us"][schedule] = us_or_null(cost.start_seconds);
   }
   std::string text = dump(head);
   text.pop_back();  // the closing brace

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,7 +21,7 @@ struct LoopShape {
 };
 LoopShape loop_shape(const Point& point);
 
-/// One traced frame: of several the one whose loop took the median time.
+/// One traced frame.
 struct TracedFrame {
   std::vector<TracedLoop> loops;
   std::vector<std::vector<TracedChunk>> chunks;  ///< by worker
@@ -29,8 +30,28 @@ struct TracedFrame {
   double untraced_seconds = 0;  ///< median of as many frames without stamps
 };
 
-/// Traces `frames` (>= 1) frames of `point`, after an untimed one. Throws InputError where the kernel does
-/// not suit the mode, Error where its threads do not run or the kernel has no loop.
+/// Of any number of frames the one whose loop takes the median time, in bounded memory: kept are the few that
+/// are nearest to the median so far. Exact up to kMostFrames frames whose chunks take at most kMostBytes;
+/// beyond, the nearest to the median of those that were kept.
+class FramesNearMedian {
+ public:
+  static constexpr std::size_t kMostFrames = 11;
+  static constexpr std::size_t kMostBytes = std::size_t{256} << 20;
+
+  void add(TracedFrame frame);
+  /// Precondition: a frame was added.
+  TracedFrame take();
+  std::size_t kept() const { return kept_.size(); }
+
+ private:
+  std::vector<double> seconds_;  // in loops, of every frame
+  std::vector<TracedFrame> kept_;
+  std::size_t bytes_ = 0;  // of the chunks in kept_
+};
+
+/// Traces `frames` (>= 1) frames of `point`, after untimed ones, and returns that of FramesNearMedian. Throws
+/// InputError where the kernel does not suit the mode or has too many loops for a trace, Error where its
+/// threads do not run, the kernel has no loop, or its chunks do not fit in memory.
 TracedFrame trace_frames(const Point& point, const Scene& scene, int frames);
 
 /// What the iterations cost on one thread.
@@ -49,21 +70,27 @@ LoopCosts measure_loop_costs(const Point& point, const Scene& scene, int frames)
 
 /// What a schedule costs in a loop whose iterations do nothing.
 struct ScheduleCost {
-  double start_seconds = 0;  ///< of a loop with one chunk for each thread: to start it and to wait for all
+  /// Of a loop with one chunk for each thread: to start it and to wait for all. Empty where the runtime never
+  /// used all threads.
+  std::optional<double> start_seconds;
   /// That a thread spends on a further chunk, while all others do the same: beyond what the iterations take
   /// under the backend's static schedule. 0 where more iterations do not make more chunks, so that all their
-  /// cost is in start_seconds.
-  double chunk_seconds = 0;
+  /// cost is in start_seconds; empty where it is not several times the noise.
+  std::optional<double> chunk_seconds;
 };
 
+/// The median of repeated differences, if it is several times the standard error of that median, estimated by
+/// their median absolute deviation; empty also for fewer than seven.
+std::optional<double> beyond_noise(const std::vector<double>& rounds);
+
 /// By to_string(ExecutionConfig): every schedule of this build that has threads, with its own chunk and with
-/// 1 and 16. Takes about a second.
+/// 1 and 16. Takes a few seconds.
 std::map<std::string, ScheduleCost> measure_schedules(int threads);
 
 /// trace.json and costs.json: harness/records.md.
 std::string trace_text(const Point& point, const LoopShape& shape, const TracedFrame& frame,
                        const Json& image);
-std::string costs_text(const Point& point, const LoopShape& shape, const LoopCosts& costs,
-                       const std::map<std::string, ScheduleCost>& schedules);
+std::string costs_text(const Point& point, const std::string& scene_hash, const LoopShape& shape,
+                       const LoopCosts& costs, const std::map<std::string, ScheduleCost>& schedules);
 
 }  // namespace rasterbench

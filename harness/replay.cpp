@@ -11,6 +11,7 @@
 #include <cstring>
 #include <fstream>
 #include <functional>
+#include <limits>
 #include <numeric>
 #include <queue>
 
@@ -100,6 +101,9 @@ CostsFile read_costs(const std::string& path) {
     throw InputError({.file = path, .byte = static_cast<std::int64_t>(error.byte)}, "is not JSON");
   }
   if (!json.is_object()) throw InputError({.file = path}, "is not an object");
+  if (const Json& schema = field(json, path, "schema"); schema != Json(1))
+    throw InputError({.file = path, .field = "schema"},
+                     fmt::format("is {}, this program reads 1", dump(schema)));
   CostsFile costs{.unit = text_of(json, path, "unit"),
                   .kernel = text_of(json, path, "kernel"),
                   .numeric = text_of(json, path, "numeric"),
@@ -111,14 +115,17 @@ CostsFile read_costs(const std::string& path) {
   if (!list.is_array() || list.size() != static_cast<std::size_t>((n + block - 1) / block))
     throw InputError({.file = path, .field = "cost_us"},
                      fmt::format("does not hold {} costs", (n + block - 1) / block));
+  double sum = 0;
   costs.microseconds.reserve(static_cast<std::size_t>(n));
   for (const Json& cost : list) {
     if (!cost.is_number() || !(cost.get<double>() >= 0) || !std::isfinite(cost.get<double>()))
       throw InputError({.file = path, .field = "cost_us"}, "holds what is not a number from 0 on");
+    sum += cost.get<double>();
     const std::int64_t share = std::min(block, n - std::ssize(costs.microseconds));
     costs.microseconds.insert(costs.microseconds.end(), static_cast<std::size_t>(share),
                               cost.get<double>() / static_cast<double>(share));
   }
+  if (!std::isfinite(sum)) throw InputError({.file = path, .field = "cost_us"}, "adds up to infinity");
   return costs;
 }
 
@@ -131,9 +138,11 @@ std::vector<double> sleeps_of(const CostsFile& costs, double scale) {
 
 Replay replay(Execution& execution, std::span<const double> sleeps) {
   Replay result{.seconds = 0,
+                .started = std::vector<double>(sleeps.size()),
                 .slept = std::vector<double>(sleeps.size()),
                 .workers = std::vector<int>(sleeps.size(), -1)};
   std::atomic<int> failed = 0;
+  double loop_begin = 0;
   const auto body = [&](std::int64_t i, int worker) {
     thread_local const int slack = prctl(PR_SET_TIMERSLACK, 1);  // nanoseconds instead of 50 us
     static_cast<void>(slack);  // where it is refused, sleeps are later, which `slept` shows
@@ -141,11 +150,12 @@ Replay replay(Execution& execution, std::span<const double> sleeps) {
     const double begin = now();
     if (const int error = sleep_until(begin + sleeps[index]); error != 0) failed = error;
     result.slept[index] = now() - begin;
+    result.started[index] = begin - loop_begin;
     result.workers[index] = worker;
   };
-  const double begin = now();
+  loop_begin = now();
   execution.loop(std::ssize(sleeps), body);
-  result.seconds = now() - begin;
+  result.seconds = now() - loop_begin;
   if (failed != 0) throw Error(fmt::format("clock_nanosleep: {}", std::strerror(failed)));
   return result;
 }
@@ -197,6 +207,40 @@ std::optional<std::int64_t> contradiction(const ExecutionConfig& config,
       if (workers[static_cast<std::size_t>(i)] != expected) return i;
     }
   return {};
+}
+
+bool can_be_contradicted(const ExecutionConfig& config, std::span<const std::int64_t> borders) {
+  if (config.schedule == "static") return config.threads > 1;
+  for (std::size_t k = 0; k + 1 < borders.size(); ++k)
+    if (borders[k + 1] - borders[k] > 1) return config.threads > 1;
+  return false;
+}
+
+std::optional<std::int64_t> order_contradiction(const ExecutionConfig& config,
+                                                std::span<const std::int64_t> borders, const Replay& run) {
+  if (config.schedule == "static" || borders.size() < 2) return {};
+  const std::size_t chunks = borders.size() - 1;
+  // The earliest start of any later chunk: as a thread stamps after it was given a chunk, all that a stamp
+  // tells is that the chunk had been handed out by then.
+  std::vector<double> later(chunks, std::numeric_limits<double>::infinity());
+  for (std::size_t k = chunks - 1; k > 0; --k)
+    later[k - 1] = std::min(later[k], run.started[static_cast<std::size_t>(borders[k])]);
+  // By the start stamps of each worker, what it ran before.
+  std::vector<std::size_t> order(chunks);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  const auto first_of = [&](std::size_t k) { return static_cast<std::size_t>(borders[k]); };
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return run.started[first_of(a)] < run.started[first_of(b)];
+  });
+  std::vector<double> asked(static_cast<std::size_t>(config.threads), 0.0);
+  std::optional<std::int64_t> found;
+  for (const std::size_t k : order) {
+    double& of_worker = asked.at(static_cast<std::size_t>(run.workers[first_of(k)]));
+    if (of_worker > later[k] && (!found || borders[k] < *found)) found = borders[k];
+    const auto last = static_cast<std::size_t>(borders[k + 1] - 1);
+    of_worker = run.started[last] + run.slept[last];
+  }
+  return found;
 }
 
 }  // namespace rasterbench

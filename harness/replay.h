@@ -29,9 +29,10 @@ std::vector<double> sleeps_of(const CostsFile& costs, double scale);
 
 /// A loop as the runtime ran it.
 struct Replay {
-  double seconds = 0;         ///< from its start to its end
-  std::vector<double> slept;  ///< seconds of each iteration: its sleep and its lateness
-  std::vector<int> workers;   ///< who ran each iteration
+  double seconds = 0;           ///< from its start to its end
+  std::vector<double> started;  ///< seconds from the loop's start to that of each iteration
+  std::vector<double> slept;    ///< seconds of each iteration: its sleep and its lateness
+  std::vector<int> workers;     ///< who ran each iteration
 };
 
 /// Sleeps `sleeps[i]` seconds in iteration i of a loop of `execution`. Throws Error where the clock fails.
@@ -53,5 +54,15 @@ double simulated_seconds(const ExecutionConfig& config, std::span<const std::int
 std::optional<std::int64_t> contradiction(const ExecutionConfig& config,
                                           std::span<const std::int64_t> borders,
                                           std::span<const int> workers);
+
+/// Whether contradiction() can find one: in a static schedule every chunk has its own worker, in others it
+/// takes a chunk of several iterations.
+bool can_be_contradicted(const ExecutionConfig& config, std::span<const std::int64_t> borders);
+
+/// The first iteration of a chunk that was handed out against the order of `borders`, however the threads
+/// were delayed: its worker asked for it (at the end of its chunk before, or the loop's start) when one that
+/// comes later in that order had already started. Empty: none, or a static schedule, which has no such order.
+std::optional<std::int64_t> order_contradiction(const ExecutionConfig& config,
+                                                std::span<const std::int64_t> borders, const Replay& run);
 
 }  // namespace rasterbench

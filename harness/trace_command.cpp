@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 
 #include "base/error.h"
@@ -33,6 +34,34 @@ Json image_json(const TraceOptions& options, const CostImage& image) {
           {"shown", image.shown}};
 }
 
+/// Two names of one file, which may not exist yet.
+bool is_same_file(const std::string& a, const std::string& b) {
+  namespace fs = std::filesystem;
+  std::error_code none;  // a generator's name is no file: then the names decide
+  if (fs::equivalent(a, b, none)) return true;
+  return fs::weakly_canonical(fs::absolute(a)) == fs::weakly_canonical(fs::absolute(b));
+}
+
+/// Outputs that would be written over each other, or over what is read, are refused before anything is.
+void check_distinct_files(const TraceOptions& options) {
+  struct File {
+    const char* option;
+    const std::string& path;
+  };
+  const std::array<File, 5> files{{{"MODEL", options.model},
+                                   {"SCENE", options.scene_file},
+                                   {"--output", options.output},
+                                   {"--costs", options.costs},
+                                   {"--image", options.image}}};
+  constexpr std::size_t kInputs = 2;
+  for (std::size_t later = kInputs; later < files.size(); ++later)
+    for (std::size_t earlier = 0; earlier < later; ++earlier)
+      if (!files[later].path.empty() && !files[earlier].path.empty() &&
+          is_same_file(files[earlier].path, files[later].path))
+        throw InputError({.field = files[later].option},
+                         fmt::format("{} is the file of {}, too", files[later].path, files[earlier].option));
+}
+
 void print_threads(const TracedFrame& frame) {
   double loops = 0;
   for (const TracedLoop& loop : frame.loops) loops += loop.end - loop.begin;
@@ -56,6 +85,7 @@ void trace(const TraceOptions& options, const DrawOptions& draw_options) {
   for (const std::string& file : {options.output, options.costs, options.image})
     if (!file.empty()) check_output_path(file);
   if (!options.image.empty()) check_image_path(options.image);
+  check_distinct_files(options);
   Point point = point_of(draw_options, options.model, options.scene_file);
   if (options.chunk > 0) {
     if (point.execution.chunk)
@@ -77,7 +107,8 @@ void trace(const TraceOptions& options, const DrawOptions& draw_options) {
 
   if (image) write_image(options.image, image->colours, point.width, point.height);
   if (!options.costs.empty())
-    write_file(options.costs, costs_text(point, shape, *costs, measure_schedules(point.execution.threads)));
+    write_file(options.costs, costs_text(point, scene_hash(scene), shape, *costs,
+                                         measure_schedules(point.execution.threads)));
   write_file(options.output, trace_text(point, shape, frame, image ? image_json(options, *image) : Json()));
 
   fmt::print("{}\n", point_name(point));

@@ -57,7 +57,7 @@ def test_runtimes_deal_by_their_rules(tmp_path, runtime, schedule, threads):
         pytest.skip("libomp is not installed")
     path = replay(tmp_path, schedule, threads, runtime, repetitions=3)
     found = replays.read(path)
-    assert not contradicts(found, runtime)
+    assert not contradicts(found, runtime) and found.contradicted == 0 and found.can_be_contradicted == (schedule != "dynamic,1")
     # A thread that other load stops between two sleeps is late by no sleep: of three runs the best is judged.
     assert best_error(found) < TOLERANCE
     # Every iteration is slept, and threads really share the loop.
@@ -92,7 +92,18 @@ def test_text_says_measured_and_simulated(tmp_path):
     assert "openmp:dynamic,2 on 16 threads" in said.stdout and "measured " in said.stdout and "simulated " in said.stdout
 
 
+def test_fewer_threads_than_asked_for_are_an_error(tmp_path):
+    done = run("replay", loops.write(tmp_path / "costs.json", COSTS), "--threads", 8, "--seconds", 0.1, OMP_THREAD_LIMIT="4")
+    assert done.code != 0 and done.stdout == "" and done.stderr.count("\n") == 1 and "4 of 8 threads ran" in done.stderr
+
+
+def test_what_cannot_be_contradicted_is_said(tmp_path):
+    said = run("replay", loops.write(tmp_path / "costs.json", COSTS), "--schedule", "dynamic,1", "--threads", 4, "--seconds", 0.1).ok()
+    assert "cannot contradict the rule here: only the order of the starts was checked" in said.stdout
+
+
 @pytest.mark.parametrize("changes, arguments, words", [
+    ({"schema": ...}, (), ("costs.json", "schema")), ({"schema": 2}, (), ("costs.json", "schema")), ({"cost_us": [1e308] * len(COSTS)}, (), ("costs.json", "cost_us")),
     ({"cost_us": [1.0]}, (), ("costs.json", "cost_us")), ({"unit": ...}, (), ("costs.json", "unit")), ({"iterations": 0}, (), ("costs.json", "iterations")),
     ({"cost_us": [0.0] * len(COSTS)}, (), ("costs.json", "cost_us")), ({}, ("--schedule", "static,2", "--chunk", 3), ("--chunk",)),
     ({}, ("--schedule", "fast"), ("fast",)), ({}, ("--scale", 1e9), ("--scale",)), ({}, ("--threads", 0), ("--threads",))])

@@ -9,14 +9,17 @@ from typing import Any
 
 import pytest
 
-from .program import CPUS, ROOT, read_png, refused, run
+from analysis import loop_costs
+from analysis import trace as analysis_trace
+
+from .program import CPUS, ROOT, Parameters, read_png, refused, run
 
 SIZE = ("--size", "128x96")
 THREADS = min(2, CPUS)
 METADATA = {"schema", "model", "scene", "size", "kernel", "numeric", "fill", "backend", "schedule", "chunk", "threads", "tile", "iterations", "unit",
-            "runtime", "cpu", "frame_us", "untraced_frame_us", "loops", "loop_begin_us", "loop_end_us", "loop_us", "chunks", "chunks_an_event",
+            "runtime", "cpu", "frame_us", "untraced_frame_us", "loops", "loop_begin_us", "loop_end_us", "loop_us", "loop_spans_us", "chunks", "chunks_an_event",
             "chunks_found_by", "git", "image"}
-COSTS = {"schema", "unit", "iterations", "iterations_a_cost", "columns", "tile", "size", "kernel", "numeric", "schedule", "threads", "cost_us", "stamp_us",
+COSTS = {"schema", "model", "scene_hash", "fill", "near", "isa", "techniques", "generality", "unit", "iterations", "iterations_a_cost", "columns", "tile", "size", "kernel", "numeric", "schedule", "threads", "cost_us", "stamp_us",
          "serial_us", "dispatch_us", "start_us"}
 
 
@@ -81,8 +84,41 @@ def test_a_loop_for_each_triangle_is_traced_and_has_no_costs(tmp_path: Path) -> 
     run(*arguments).ok()
     trace = json.loads((tmp_path / "t.json").read_text())
     assert trace["metadata"]["loops"] > 1 and {event["args"]["loop"] for event in chunks(trace)} == set(range(trace["metadata"]["loops"]))
+    spans = trace["metadata"]["loop_spans_us"]
+    assert len(spans) == trace["metadata"]["loops"]
+    for event in chunks(trace):
+        begin, end = spans[event["args"]["loop"]]
+        assert begin - 0.002 <= event["ts"] and event["ts"] + event["dur"] <= end + 0.002
+    table = analysis_trace.threads_table(analysis_trace.read(tmp_path / "t.json")).numbers
+    assert table[[f"{name}_us" for name in analysis_trace.SHARES]].sum(axis=1).to_list() == pytest.approx([spans[-1][1] - spans[0][0]] * len(table), abs=1)
     refused(run(*arguments, "--costs", tmp_path / "c.json"), "--costs")
     assert not (tmp_path / "c.json").exists()
+
+
+@pytest.mark.parametrize("arguments, what", [
+    (("m.dat", "-o", "m.dat"), "MODEL"), (("m.dat", "s.txt", "-o", "s.txt"), "SCENE"), (("m.dat", "-o", "t.json", "--costs", "./t.json"), "--output"),
+    (("m.dat", "--costs", "a.png", "--image", "folder/../a.png"), "--costs"), (("m.dat", "--costs", "link.json"), "MODEL")])
+def test_files_that_would_be_written_over_are_refused_before_anything_is(tmp_path: Path, arguments: tuple, what: str) -> None:
+    (tmp_path / "folder").mkdir()
+    for name in ("m.dat", "s.txt"):
+        (tmp_path / name).write_text("kept")
+    (tmp_path / "link.json").symlink_to("m.dat")
+    refused(run("trace", *arguments, *SIZE, cwd=tmp_path), f"is the file of {what}, too")
+    assert {path.name for path in tmp_path.iterdir()} == {"folder", "m.dat", "s.txt", "link.json"}
+    assert (tmp_path / "m.dat").read_text() == (tmp_path / "s.txt").read_text() == "kept"
+
+
+def test_more_threads_than_iterations_and_a_picture_without_triangles(tmp_path: Path) -> None:
+    run("trace", "teapot:triangles=300", "--size", "64x32", "--kernel", "scanline", "--threads", THREADS, "--frames", 15, "-o", "t.json", cwd=tmp_path).ok()
+    trace = json.loads((tmp_path / "t.json").read_text())
+    check(trace, 2)
+    Parameters(camera=(1000.0, 2.0, 4.0), near=0.5, far=0.6).write(tmp_path / "away.txt")
+    for kernel in ("row_parallel", "bounding_box", "triangle_atomics"):
+        done = run("trace", "teapot:triangles=300", tmp_path / "away.txt", *SIZE, "--kernel", kernel, "--frames", 1, "-o", "t.json", cwd=tmp_path)
+        if done.code == 0:
+            analysis_trace.read(tmp_path / "t.json")
+        else:  # no visible triangle, no loop
+            assert kernel == "bounding_box" and "no loop to trace" in done.stderr
 
 
 @pytest.mark.parametrize("arguments, words", [
@@ -96,6 +132,13 @@ def test_a_loop_for_each_triangle_is_traced_and_has_no_costs(tmp_path: Path) -> 
 def test_refused(tmp_path: Path, arguments: tuple, words: str) -> None:
     refused(run("trace", "teapot:triangles=300", *SIZE, *arguments, cwd=tmp_path), words)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_costs_can_be_compared_with_a_study_of_the_same_loop(tmp_path: Path) -> None:
+    """Each axis that whatif matches is the one that a record of the same point has."""
+    run("trace", "teapot:triangles=300", *SIZE, "--kernel", "row_parallel", "--threads", 1, "--frames", 1, "-o", "t.json", "--costs", "c.json", cwd=tmp_path).ok()
+    costs = loop_costs.read(tmp_path / "c.json")
+    assert all(costs.axes.values()) and set(costs.axes) == set(loop_costs.AXES)
 
 
 def test_figures_of_a_trace(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from matplotlib.ticker import MaxNLocator
 
 from .. import style, text
 from ..captions import Caption, Facts
-from ..trace import SHARES, CostImage, Trace
+from ..trace import SHARES, CostImage, Trace, shares
 from .common import Drawing
 
 SECTION = "Trace"
@@ -24,7 +24,8 @@ COLUMNS = 1400  # of such a picture
 LANE = 0.3  # inches
 MOST_LANES = 24
 PAIR = ("#0072B2", "#A6D0EA")  # chunks take turns: dark and light also in grey
-SHARE_LOOKS = {"chunks": (style.COLOURS[0], ""), "between": (style.COLOURS[4], "////"), "before": ("#FFFFFF", "...."), "after": ("#C9C9C9", "")}
+SHARE_LOOKS = {"chunks": (style.COLOURS[0], ""), "between": (style.COLOURS[4], "////"), "before": ("#FFFFFF", "...."), "after": ("#C9C9C9", ""),
+               "none": ("#FFFFFF", ""), "outside": ("#7F7F7F", "xxxx")}
 
 
 def draw(trace: Trace, threads: pd.DataFrame) -> Iterator[Drawing]:
@@ -107,24 +108,25 @@ def covered(low: np.ndarray, high: np.ndarray, span: float) -> np.ndarray:
 
 def _shares(trace: Trace, threads: pd.DataFrame) -> Drawing:
     lanes = _lanes(trace)
-    columns = style.legend_columns(list(SHARES.values()))
-    figure, axes = _lane_axes(trace, lanes, f"Time of each thread, {trace.title}", 0.5 + 0.17 * -(-len(SHARES) // columns))
+    shown = shares(threads)
+    columns = style.legend_columns([SHARES[share] for share in shown])
+    figure, axes = _lane_axes(trace, lanes, f"Time of each thread, {trace.title}", 0.5 + 0.17 * -(-len(shown) // columns))
     for y, lane in enumerate(lanes):
         at = 0.0
         row = threads.iloc[lane]
-        for share in ("before", "chunks", "between", "after"):
+        for share in shown:
             colour, hatch = SHARE_LOOKS[share]
             axes.barh(y, row[f"{share}_us"], left=at, height=0.7, color=colour, hatch=hatch, ec="black", lw=0.4)
             at += row[f"{share}_us"]
     axes.set_xlim(0, None)
     axes.xaxis.set_major_locator(MaxNLocator(7))
     axes.set_xlabel("time of the loop (µs)")
-    keys = [Patch(fc=SHARE_LOOKS[s][0], hatch=SHARE_LOOKS[s][1], ec="black", lw=0.4, label=SHARES[s]) for s in ("before", "chunks", "between", "after")]
+    keys = [Patch(fc=SHARE_LOOKS[s][0], hatch=SHARE_LOOKS[s][1], ec="black", lw=0.4, label=SHARES[s]) for s in shown]
     figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.01, 0.0), ncol=columns, columnspacing=1.0, handletextpad=0.5)
     busy = threads["chunks_us"]
     note = f"Imbalance (longest / mean time in chunks) {busy.max() / busy.mean():.3f}. " if busy.mean() > 0 else ""
     return Drawing("thread_shares", SECTION, figure, Caption(f"Time of each thread, {trace.title}", note + _facts(trace),
-                                                       "Bars are equally long: each is the whole loop, divided by what the thread did.",
+                                                       "Bars are equally long: each is the time from the first loop's begin to the last one's end, divided by what the thread did.",
                                                        _frame_facts(trace)))
 
 
@@ -148,5 +150,5 @@ def _cost(trace: Trace, image: CostImage) -> Drawing:
     return Drawing("cost", SECTION, figure, Caption(
         f"Cost of each {trace.metadata['unit']}, {trace.title}",
         f"Median time of each {trace.metadata['unit']} on one thread, without what the stamps add, over the picture in grey.{spread}{hidden} The scale ends at"
-        f" the 99.9th percentile of the pixels. Machine: {trace.machine}.",
+        f" the 99.9th percentile of the pixels that cost something. Machine: {trace.machine}.",
         "Brighter costs more; the bar shows the colours as they look over a middle grey.", _frame_facts(trace)), raster=True)

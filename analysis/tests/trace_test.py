@@ -46,7 +46,7 @@ def test_time_of_the_threads_adds_up(tmp_path: Path) -> None:
 def test_figures_captions_and_words(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     assert main(["trace", str(made(tmp_path, image=True)), "--out", str(tmp_path / "out")]) == 0
     written = {path.name for path in (tmp_path / "out").iterdir()}
-    assert written == {f"{n}.{k}" for n in ("gantt", "thread_shares", "cost") for k in ("png", "svg", "pdf", "json")} | {"threads.csv", "threads.tex", "captions.txt"}
+    assert written == {f"{n}.{k}" for n in ("gantt", "thread_shares", "cost") for k in ("png", "svg", "pdf", "json")} | {"threads.csv", "threads.tex", "captions.txt", ".written.json"}
     captions = (tmp_path / "out/captions.txt").read_text()
     for words in ("no sample", "no interval", "0.200 ms", "0.150 ms", "A CPU", "libgomp", "stamps", "Imbalance (longest / mean time in chunks) 1.385"):
         assert words in captions
@@ -54,13 +54,44 @@ def test_figures_captions_and_words(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert "imbalance 1.385" in printed and "65.0 % of 2 x 100.0 us lie in chunks" in printed
 
 
-def test_a_thread_without_a_chunk_waits_all_the_time(tmp_path: Path) -> None:
+def test_the_figures_are_never_written_over_the_image_that_is_read(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    def named(value: dict[str, Any]) -> None:
+        value["metadata"]["image"]["file"] = "cost.png"
+
+    path = made(tmp_path, image=True)
+    (tmp_path / "i.png").rename(tmp_path / "cost.png")
+    value = json.loads(path.read_text())
+    named(value)
+    path.write_text(json.dumps(value))
+    before = (tmp_path / "cost.png").read_bytes()
+    assert main(["trace", str(path), "--out", str(tmp_path)]) == 2
+    assert "cost.png" in (said := capsys.readouterr().err) and said.count("\n") == 1
+    assert sorted(f.name for f in tmp_path.iterdir()) == ["cost.png", "trace.json"]
+    assert main(["trace", str(path)]) == 0 and (tmp_path / "figures/cost.png").is_file()
+    assert (tmp_path / "cost.png").read_bytes() == before
+
+
+def test_loops_are_shared_one_by_one(tmp_path: Path) -> None:
+    """Thread 0 runs a chunk in both loops, thread 1 in the second alone; 20 us lie between them."""
+    def two(value: dict[str, Any]) -> None:
+        value["metadata"].update(loops=2, loop_spans_us=[[10.0, 50.0], [70.0, 110.0]], loop_us=80.0)
+        value["traceEvents"] = [{"name": "chunk", "ph": "X", "ts": ts, "dur": dur, "tid": tid, "args": {"first": first, "last": first, "loop": loop}}
+                                for tid, ts, dur, first, loop in ((0, 15, 30, 0, 0), (0, 72, 20, 0, 1), (1, 75, 35, 1, 1))]
+
+    traced = trace.read(made(tmp_path, two))
+    numbers = trace.threads_table(traced).numbers
+    assert numbers[["before_us", "chunks_us", "between_us", "after_us", "none_us", "outside_us"]].values.tolist() == [
+        [7, 50, 0, 23, 0, 20], [5, 35, 0, 0, 40, 20]]
+    trace.write(traced, tmp_path / "out")
+
+
+def test_a_thread_without_a_chunk_has_a_share_of_its_own(tmp_path: Path) -> None:
     def alone(value: dict[str, Any]) -> None:
         value["traceEvents"] = [e for e in value["traceEvents"] if e["tid"] == 0]
 
     traced = trace.read(made(tmp_path, alone))
     row = trace.threads_table(traced).numbers.iloc[1]
-    assert (row["chunks_us"], row["between_us"], row["before_us"] + row["after_us"]) == (0, 0, 100)
+    assert (row["chunks_us"], row["between_us"], row["before_us"], row["after_us"], row["none_us"]) == (0, 0, 0, 0, 100)
     trace.write(traced, tmp_path / "out")
 
 
@@ -71,6 +102,7 @@ def test_many_chunks_are_drawn_as_shares_of_columns(tmp_path: Path) -> None:
 
     def many(value: dict[str, Any]) -> None:
         value["traceEvents"] = [{"name": "chunk", "ph": "X", "ts": 10 + 0.02 * i, "dur": 0.01, "tid": 0, "args": {"first": i, "last": i}} for i in range(4000)]
+        value["metadata"]["iterations"] = 4000
 
     trace.write(trace.read(made(tmp_path, many)), tmp_path / "out")
     assert (tmp_path / "out/gantt.png").is_file()
@@ -83,6 +115,20 @@ def test_many_chunks_are_drawn_as_shares_of_columns(tmp_path: Path) -> None:
     (lambda v: v["metadata"].update(threads=0), "metadata.threads"),
     (lambda v: v["metadata"].update(loop_end_us="x"), "metadata.loop_end_us"),
     (lambda v: v["metadata"].pop("chunk"), "metadata.chunk: missing"),
+    (lambda v: v["metadata"].update(chunk="x"), "metadata.chunk"),
+    (lambda v: v["metadata"].update(threads=10**6), "metadata.threads: expected a whole number from 1 to 65536"),
+    (lambda v: v["metadata"].update(loop_end_us=10.0), "metadata.loop_end_us: is not after"),
+    (lambda v: v["metadata"].update(loop_begin_us=12.0), "not within its loop"),
+    (lambda v: v["metadata"].update(loop_end_us=104.0), "not within its loop"),
+    (lambda v: v["metadata"].update(loops=2), "metadata.loop_spans_us: missing"),
+    (lambda v: v["metadata"].update(loops=2, loop_spans_us=[[10, 110]]), "metadata.loop_spans_us: expected"),
+    (lambda v: v["metadata"].update(loops=2, loop_spans_us=[[10, 60], [50, 110]]), "metadata.loop_spans_us: expected"),
+    (lambda v: v["traceEvents"][1]["args"].update(loop=1), "traceEvents[1].loop"),
+    (lambda v: v["traceEvents"][1]["args"].update(first=0.5), "traceEvents[1].first"),
+    (lambda v: v["traceEvents"][3]["args"].update(last=10), "traceEvents[3].last"),
+    (lambda v: v["traceEvents"][1]["args"].update(chunks=0), "traceEvents[1].args.chunks"),
+    (lambda v: v["traceEvents"][1]["args"].update(chunks="x"), "traceEvents[1].args.chunks"),
+    (lambda v: v["traceEvents"][1]["args"].update(iterations=5), "traceEvents[1].args.iterations"),
     (lambda v: v.update(traceEvents={}), "traceEvents: expected an array"),
     (lambda v: v.update(traceEvents=[]), "holds no chunk"),
     (lambda v: v["traceEvents"][1].update(tid=2), "traceEvents[1].tid"),

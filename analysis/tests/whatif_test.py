@@ -85,7 +85,8 @@ def test_the_interval_of_a_law_holds_its_parameter():
 @pytest.mark.parametrize("changes, field", [
     ({"unit": "furlong"}, "unit"), ({"kernel": ...}, "kernel"), ({"iterations": 0}, "iterations"), ({"iterations": 4}, "cost_us"),
     ({"cost_us": [1, -1, 1]}, "cost_us"), ({"cost_us": [0, 0, 0]}, "cost_us"), ({"size": [1]}, "size"), ({"tile": 0}, "tile"),
-    ({"serial_us": "long"}, "serial_us"), ({"dispatch_us": {"openmp:static": -1}}, "dispatch_us.openmp:static"), ({"threads": True}, "threads")])
+    ({"serial_us": "long"}, "serial_us"), ({"dispatch_us": {"openmp:static": -1}}, "dispatch_us.openmp:static"), ({"threads": True}, "threads"), ({"threads": 65537}, "threads"), ({"schema": ...}, "schema"),
+    ({"schema": 2}, "schema"), ({"cost_us": [1e308, 1e308, 1]}, "cost_us"), ({"isa": 3}, "isa")])
 def test_bad_fields_are_named(tmp_path, capsys, changes, field):
     path = loops.write(tmp_path / "costs.json", [1.0, 2.0, 3.0], **changes)
     assert program.main(["whatif", str(path), "--out", str(tmp_path / "out")]) == 2
@@ -94,8 +95,14 @@ def test_bad_fields_are_named(tmp_path, capsys, changes, field):
     assert not (tmp_path / "out").exists()
 
 
+def today(records):
+    """Axes that the records of older versions do not have."""
+    for entry in records:
+        entry["config"].update(techniques="all", generality="minimal")
+
+
 def plan(**changes):
-    return synthetic.plan(**(dict(kernels=["row_parallel"], scenes={"teapot": (6320, 45.0, [1920, 1080])}, untimed=False,
+    return synthetic.plan(**(dict(edit=today, kernels=["row_parallel"], scenes={"teapot": (6320, 45.0, [1920, 1080])}, untimed=False,
                                   threads=[1, 2, 4, 8]) | changes))
 
 
@@ -126,7 +133,12 @@ def test_a_study_of_something_else_or_of_several_scenes_is_refused(tmp_path, cap
     study = synthetic.write(tmp_path / "study", plan())
     assert program.main(["whatif", str(costs), "--measured", str(study), "--out", str(tmp_path / "out")]) == 2
     assert "holds no timed point of tile_parallel" in capsys.readouterr().err
-    two = synthetic.write(tmp_path / "two", plan(scenes={name: (6320, 45.0, [1920, 1080]) for name in ("teapot", "city")}))
+    def alike(records):
+        today(records)
+        for entry in records:
+            entry["config"]["scene_hash"] = synthetic.digest("teapot")
+
+    two = synthetic.write(tmp_path / "two", plan(edit=alike, scenes={name: (6320, 45.0, [1920, 1080]) for name in ("teapot", "city")}))
     costs = loops.write(tmp_path / "costs.json", loops.heavy(100))
     arguments = ["whatif", str(costs), "--measured", str(two), "--out", str(tmp_path / "out")]
     assert program.main(arguments) == 2
@@ -134,10 +146,54 @@ def test_a_study_of_something_else_or_of_several_scenes_is_refused(tmp_path, cap
     assert program.main([*arguments, "--scene", "city"]) == 0
 
 
+@pytest.mark.parametrize("axis, value", [("scene_hash", "another"), ("fill", "closed"), ("near", "off"), ("isa", "avx2"), ("techniques", "none"),
+                                         ("generality", "full")])
+def test_costs_of_another_loop_are_not_compared(tmp_path, capsys, axis, value):
+    study = synthetic.write(tmp_path / "study", plan())
+    arguments = ["--measured", str(study), "--out", str(tmp_path / "out")]
+    costs = loops.write(tmp_path / "costs.json", loops.heavy(100), **{axis: value})
+    assert program.main(["whatif", str(costs), *arguments]) == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1 and f"config.{axis}:" in err and value in err
+    older = loops.write(tmp_path / "older.json", loops.heavy(100), **{axis: ...})
+    assert program.main(["whatif", str(older), *arguments]) == 2
+    assert f"older.json: {axis}: missing, as in traces of older versions" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_points_under_other_conditions_are_series_of_their_own(tmp_path):
+    def cold(records):
+        today(records)
+        for entry in [json.loads(json.dumps(entry)) for entry in records]:
+            entry["config"]["cache"] = "cold"
+            entry |= {"id": synthetic.digest(entry["config"]), "name": entry["name"] + "/cold", "samples_ms": [3 * t for t in entry["samples_ms"]]}
+            entry["stages_ms"] = {key: v and [3 * t for t in v] for key, v in entry["stages_ms"].items()}
+            records.append(entry)
+
+    m = model(tmp_path, loops.heavy(100))
+    study = synthetic.write(tmp_path / "study", plan(edit=cold, threads=[1, 2]))
+    found = whatif.measured(m, study, None)
+    assert {"openmp dynamic,1, cache warm", "openmp dynamic,1, cache cold"} <= set(found.fits)
+    warm, cool = ({(p.prediction.name, p.prediction.threads): p.speedup.value for p in found.points if p.record.config.cache == c} for c in ("warm", "cold"))
+    assert warm and warm == pytest.approx(cool)  # each over one thread of its own
+
+
+def test_an_unmeasured_overhead_is_said(tmp_path):
+    m = model(tmp_path, [1.0, 2.0], dispatch_us=loops.DISPATCH | {"openmp:guided": None})
+    assert m.costs.overhead("openmp", "guided", 8) == (0.0, "not measured")
+    assert any("No overhead of a chunk was measured for openmp guided (libgomp)" in line for line in whatif.cautions(m))
+
+
+@pytest.mark.parametrize("threads, words", [(1, "measured on 1 thread, where nobody contends"), (2, "measured on 2 threads; with more")])
+def test_the_threads_of_the_overhead_are_said(tmp_path, threads, words):
+    assert any(words in line for line in whatif.cautions(model(tmp_path, [1.0, 2.0], threads=threads)))
+
+
 def replay(tmp_path, **changes):
     """As `rasterbench replay --json` writes it: two threads, dynamic,1, each iteration 1 ms, measured 5 % late."""
     value = {"execution": "openmp:dynamic,1", "runtime": "libgomp", "threads": 2, "iterations": 4,
-             "repetitions": [{"measured_ms": 2.1, "slept_ms": [1.0] * 4, "workers": [0, 1, 0, 1]}]} | changes
+             "repetitions": [{"measured_ms": 2.1, "slept_ms": [1.0] * 4, "workers": [0, 1, 0, 1], "contradiction": None,
+                              "order_contradiction": None}], "can_be_contradicted": False} | changes
     path = tmp_path / "replay.json"
     path.write_text(json.dumps(value))
     return path
@@ -150,7 +206,26 @@ def test_the_error_of_a_replay_is_stated(tmp_path, capsys):
     assert pd.read_csv(tmp_path / "out/whatif_replay.csv").error.to_list() == pytest.approx([2.0 / 2.1 - 1])
 
 
-@pytest.mark.parametrize("changes, field", [({"execution": "openmp:auto"}, "execution"), ({"runtime": "other"}, "runtime"), ({"threads": 0}, "threads"),
+def test_a_contradicted_replay_is_named(tmp_path, capsys):
+    costs = loops.write(tmp_path / "costs.json", loops.heavy(100))
+    run = {"measured_ms": 2.1, "slept_ms": [1.0] * 4, "workers": [0, 1, 0, 1], "contradiction": None, "order_contradiction": None}
+    arguments = ["whatif", str(costs), "--replay", str(tmp_path / "replay.json"), "--out", str(tmp_path / "out")]
+    replay(tmp_path)
+    assert program.main(arguments) == 0
+    assert "cannot be contradicted" in (said := capsys.readouterr().out) and "CONTRADICTS" not in said
+    for key in ("contradiction", "order_contradiction"):
+        replay(tmp_path, repetitions=[run, run | {key: 2}])
+        assert program.main(arguments) == 0
+        said = capsys.readouterr().out
+        assert "CONTRADICTED by 1 of 2" in said and "CONTRADICTS the rule of libgomp in 1 of 2 repetitions" in said
+        assert pd.read_csv(tmp_path / "out/whatif_replay.csv").contradicted.to_list() == [1]
+
+
+@pytest.mark.parametrize("changes, field", [({"execution": "openmp:auto"}, "execution"), *(({"execution": f"openmp:dynamic,{word}"}, "execution")
+                                            for word in ("", "0", "x", "\u00b2", "-1", "9" * 30)), ({"threads": 65537}, "threads"),
+                                            ({"repetitions": [{"measured_ms": 2.1, "slept_ms": [1.0] * 4, "workers": [0, 1, 0, 1]}]}, "repetitions"),
+                                            ({"repetitions": [{"measured_ms": 2.1, "slept_ms": [1.0] * 4, "workers": [0] * 4, "contradiction": 4}]},
+                                             "repetitions"), ({"runtime": "other"}, "runtime"), ({"threads": 0}, "threads"),
                                             ({"iterations": 3}, "repetitions"), ({"repetitions": []}, "repetitions")])
 def test_bad_replays_are_refused(tmp_path, capsys, changes, field):
     costs = loops.write(tmp_path / "costs.json", loops.heavy(100))
