@@ -57,7 +57,9 @@ def test_runtimes_deal_by_their_rules(tmp_path, runtime, schedule, threads):
         pytest.skip("libomp is not installed")
     path = replay(tmp_path, schedule, threads, runtime, repetitions=3)
     found = replays.read(path)
-    assert not contradicts(found, runtime) and found.contradicted == 0 and found.can_be_contradicted == (schedule != "dynamic,1")
+    assert not contradicts(found, runtime) and found.contradicted == 0
+    largest = np.diff(schedule_model.boundaries(found.schedule, runtime, len(COSTS), threads, found.chunk)).max()
+    assert found.can_be_contradicted == (found.schedule == "static" or largest > 1)
     # A thread that other load stops between two sleeps is late by no sleep: of three runs the best is judged.
     assert best_error(found) < TOLERANCE
     # Every iteration is slept, and threads really share the loop.
