@@ -182,6 +182,7 @@ def faults(cluster: Cluster, tmp_path_factory: pytest.TempPathFactory) -> dict[s
     wait_for(all_sampling, "samples of all four", explain=lambda: logs(out))
     begun = {name: journals(out, family[name])[0].parent.name.partition("@")[2] for name in names}
     journal_before = journals(out, family["term"])[0].read_text()
+    running = cluster.status(out)
     assert len(set(begun.values())) == NODES, "not one element a node"
 
     runners = [pid for pid, words in processes() if "runner" in words and job_of(pid) == f"{job}_3"]
@@ -192,7 +193,6 @@ def faults(cluster: Cluster, tmp_path_factory: pytest.TempPathFactory) -> dict[s
     cluster.command("scancel", "--signal=TERM", "--batch", f"{job}_0").ok()
     cluster.command("scancel", f"{job}_2").ok()
     at_once = families(out)
-    running = cluster.status(out)
     cluster.wait_until_empty()
     cluster.command("scontrol", "update", f"NodeName={begun['down']}", "State=RESUME").ok()
     merged = cluster.merge(out, "--no-report")
@@ -228,10 +228,22 @@ def complete(folder: Path) -> None:
     assert len(finished) == 2 and all(len(r["samples_ms"]) == LONG for r in finished)
 
 
+def test_what_runs_is_said(faults: dict[str, Any]) -> None:
+    said = faults["running"]
+    assert said.code == 3 and "4 running" in said.stdout
+    for name, family in faults["family"].items():
+        line = state_of(said.stdout, family)
+        assert line.startswith("running ") and f"on {faults['begun'][name]}" in line
+
+
 def test_term_requeues_its_element_which_completes(faults: dict[str, Any]) -> None:
     where = provenance(faults, "term")
     assert where["restart"] == 1 and f"{where['array_job']}_{where['array_task']}" == f"{faults['job']}_0"
     assert ends(faults, "term") == ["requeued", "done"], logs(faults["out"])
+    attempts = faults["out"] / "slurm/attempts" / faults["family"]["term"]
+    first = min(attempts.glob("*.0.end")).read_text()
+    assert "interrupted; what was measured is in" in first, f"the program did not end in good order: {first}"
+    assert not list(attempts.glob("*.pid"))
     folder = faults["out"] / "slurm/families" / faults["family"]["term"]
     complete(folder)
     journal = (folder / "journal.jsonl").read_text()
@@ -295,6 +307,7 @@ def test_after_three_requeues_an_element_gives_up(cluster: Cluster, tmp_path: Pa
     cluster.wait_until_empty()
     assert "State=FAILED" in cluster.command("scontrol", "show", "job", fourth).ok().stdout
     (end,) = (out / "slurm/attempts" / family).glob("*.end")
+    assert "interrupted" in end.read_text()
     assert end.read_text().splitlines()[-1] == "timed out: TERM came again after 3 requeues"
     assert families(out) == []
 
@@ -387,7 +400,7 @@ def test_without_c_srun_gives_one_cpu_and_nothing_is_measured(bound_cluster: Clu
 def test_scaling_sbatch(bound_cluster: Cluster, tmp_path: Path) -> None:
     study = tiny(tmp_path / "s.toml", scene="teapot:triangles=300", size="64x48", numeric="f32", threads=["1..max"])
     done = bound_cluster.command("sbatch", "--wait", "--cpus-per-task=2", "--mem=1G", f"--output={tmp_path}/log", ROOT / "slurm/scaling.sbatch",
-                                 study, tmp_path / "out", RASTERBENCH=str(program()))
+                                 study, tmp_path / "out", cwd=ROOT, RASTERBENCH=str(program()))
     assert done.code == 0, (tmp_path / "log").read_text()
     assert {r["config"]["threads"] for r in records(tmp_path / "out")} == {1, 2}
     assert "report: " in (tmp_path / "log").read_text()

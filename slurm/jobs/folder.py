@@ -3,7 +3,7 @@
     DIR/context.json, records.jsonl, images/, report.html     made by slurm/merge, as of a study on one machine
     DIR/slurm/manifest.json       the plan: `rasterbench study --list --json` with the options that made it
     DIR/slurm/programs/BUILD_ID/  the program as it was when the study was submitted
-    DIR/slurm/submissions/N/      scripts, tasks and job ids of the N-th submission
+    DIR/slurm/submissions/N/      scripts, study file, tasks and job ids of the N-th submission
     DIR/slurm/work/FAMILY@NODE/   a study of one family that is under way on a node, with its journal
     DIR/slurm/families/FAMILY/    one that was completed: renamed into place as a whole
     DIR/slurm/attempts/FAMILY/    when.JOB_INDEX.RESTART.json and .end: where each attempt ran and how it ended
@@ -16,6 +16,7 @@ import contextlib
 import fcntl
 import json
 import os
+import re
 import tempfile
 import time
 from dataclasses import dataclass
@@ -23,6 +24,9 @@ from pathlib import Path
 from typing import Any, Iterator
 
 SCHEMA = 1
+# What merge takes from a family's context.json.
+_OF_CONTEXT = {"schema": int, "id": str, "started": str, "finished": str, "machine": dict, "environment": dict, "study": dict,
+               "libraries": dict, "scenes": dict}
 
 
 class InputError(Exception):
@@ -95,6 +99,8 @@ def manifest_of(value: dict[str, Any], place: object) -> Manifest:
             raise InputError(place, f"schema: is {value['schema']!r}, this program reads {SCHEMA}")
         for key in ("study", "file", "hash", "build_id", "cpus", "isa"):
             value[key]
+        if not isinstance(value["cpus"], int):
+            raise TypeError("cpus")
         if any(not isinstance(point[key], str) for family in families for point in family.points for key in ("id", "name")):
             raise TypeError("a point")
     except (KeyError, TypeError, ValueError) as error:
@@ -183,12 +189,19 @@ class Folder:
 
     def submissions(self) -> list[int]:
         folder = self.slurm / "submissions"
-        return sorted(int(path.name) for path in folder.iterdir() if path.name.isdigit()) if folder.is_dir() else []
+        return sorted(int(path.name) for path in folder.iterdir() if re.fullmatch("[0-9]+", path.name)) if folder.is_dir() else []
 
     def submission(self, number: int) -> dict[str, Any]:
-        """Its arrays and jobs; one that was killed before its first array has none."""
+        """Its arrays and jobs; one that was killed before its first array has none. Throws InputError."""
         path = self.slurm / "submissions" / str(number) / "submission.json"
-        return read_json(path) if path.exists() else {"arrays": []}
+        if not path.exists():
+            return {"arrays": [], "merge": None}
+        value = read_json(path)
+        arrays = value.get("arrays")
+        if not isinstance(arrays, list) or not all(isinstance(a, dict) and isinstance(a.get("tasks"), str) and a.get("tasks")
+                                                   and isinstance(a.get("job"), (int, type(None))) and "job" in a for a in arrays):
+            raise InputError(path, "arrays: expected a list of {tasks, job, ...}")
+        return value
 
     def elements(self) -> dict[str, list[Element]]:
         """By family: the elements that were to measure it, the latest first."""
@@ -197,9 +210,20 @@ class Folder:
             for array in self.submission(number)["arrays"]:
                 if array["job"] is None:
                     continue
-                lines = (self.slurm / "submissions" / str(number) / array["tasks"]).read_text().splitlines()
-                for index, family, _ in map(str.split, lines):
-                    found.setdefault(family, []).append(Element(number, array["job"], int(index)))
+                for index, family in self.tasks(number, array["tasks"]):
+                    found.setdefault(family, []).append(Element(number, array["job"], index))
+        return found
+
+    def tasks(self, number: int, name: str) -> list[tuple[int, str]]:
+        """Index and family of each line. Throws InputError."""
+        path = self.slurm / "submissions" / str(number) / name
+        found = []
+        try:
+            for line in path.read_text(encoding="utf-8").splitlines():
+                index, family, _ = line.split()
+                found.append((int(index), family))
+        except ValueError:  # of UTF-8 too
+            raise InputError(f"{path}:{len(found) + 1}", "expected an index, a family and a shard") from None
         return found
 
     # Results.
@@ -220,21 +244,26 @@ class Folder:
                 raise InputError("records.jsonl", "its points are not those of the manifest")
             if provenance["family"] != family.id or not isinstance(provenance["node"], str):
                 raise InputError("provenance.json", "of another family")
+            for key, kind in _OF_CONTEXT.items():
+                if not isinstance(context[key], kind):
+                    raise InputError("context.json", f"{key} is not as a study writes it")
             failed = [record for record in records if record["status"] == "failed"]
             reason = "; ".join(f"{record['name']}: {record.get('reason', 'no reason')}" for record in failed)
         except (InputError, OSError, UnicodeDecodeError, ValueError, KeyError, TypeError) as error:
             return Result("damaged", f"{path}: {type(error).__name__ if isinstance(error, KeyError) else ''}{error}")
         return Result("failed" if failed else "done", reason, records, context, provenance)
 
-    def last_attempt(self, family: str) -> tuple[dict[str, Any], list[str]] | None:
-        """Where the latest attempt ran, and what it said at its end (nothing: it runs, or was killed)."""
-        folder = self.slurm / "attempts" / family
-        begun = sorted(folder.glob("*.json")) if folder.is_dir() else []
-        if not begun:
+    def last_attempt(self, family: str, element: Element) -> tuple[dict[str, Any], list[str]] | None:
+        """Where the latest attempt of `element` ran, and what it said at its end (nothing: it runs, or was killed). The latest
+        is that of the highest restart: the clocks of nodes differ, so the time in the name decides only between equals."""
+        found = [(int(match[2]), int(match[1]), path) for path in (self.slurm / "attempts" / family).glob(f"*.{element}.*.json")
+                 if (match := re.fullmatch(rf"([0-9]+)\.{element}\.([0-9]+)\.json", path.name))]
+        if not found:
             return None
-        end = begun[-1].with_suffix(".end")
+        begun = max(found)[-1]
+        end = begun.with_suffix(".end")
         try:
-            where = read_json(begun[-1])
+            where = read_json(begun)
         except InputError:  # the disk was full
             where = {}
         return where, end.read_text(encoding="utf-8", errors="replace").splitlines() if end.is_file() else []

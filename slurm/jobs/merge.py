@@ -69,7 +69,7 @@ def merged_context(manifest: Manifest, parts: Sequence[State], images: dict[str,
     context["machine"]["load_average"] = highest_load([machine.get("load_average") for machine in machines])
     context["environment"] = {key: value for key, value in contexts[0]["environment"].items()
                               if all(c["environment"].get(key) == value for c in contexts)}
-    context["study"]["shard"] = "1/1"
+    context["study"] |= {"shard": "1/1", "file": manifest.value["file"]}
     for key in ("libraries", "scenes"):
         context[key] = {name: value for c in contexts for name, value in c[key].items()}
     limits = [c["limits"] for c in contexts if "limits" in c]
@@ -121,6 +121,17 @@ def merge_images(folder: Folder, parts: Sequence[State]) -> dict[str, str]:
     return images
 
 
+def set_stale_aside(folder: Folder) -> None:
+    """What an earlier merge made of results that are no longer there: it is not of this plan."""
+    for name in ("records.jsonl", "context.json"):
+        path, number = folder.root / name, 1
+        if path.exists():
+            while (target := path.with_name(f"{path.stem}.stale-{number}{path.suffix}")).exists():
+                number += 1
+            path.rename(target)
+            print(f"no result is there any more: the {name} of an earlier merge is kept as {target.name}")
+
+
 def run(directory: Path, report: bool) -> int:
     folder = Folder.existing(directory)
     with folder.lock("merge", LOCK_WAIT_S):
@@ -140,18 +151,24 @@ def run(directory: Path, report: bool) -> int:
                   f" {', '.join(nodes)} ({'; '.join(types)})")
             if len(types) > 1:
                 print(f"these are {len(types)} types of nodes: only points of one family may be compared")
+        else:
+            set_stale_aside(folder)
         missing = [state for state in found if state.kind != "done"]
         for state in missing:
             print(f"missing: {state.family.title} (family {state.family.id[:8]}, {len(state.family.points)} points): {state.kind}:"
                   f" {state.reason}")
         print(states.progress(found))
+        if missing:  # before the report, which may fail
+            print(f"slurm/merge: {directory}: incomplete: {len(missing)} of {len(found)} families are missing; run slurm/submit again",
+                  file=sys.stderr)
         if report and parts:
-            draw(folder.root)
-    if missing:
-        print(f"slurm/merge: {directory}: incomplete: {len(missing)} of {len(found)} families are missing; run slurm/submit again",
-              file=sys.stderr)
-        return 3
-    return 0
+            try:
+                draw(folder.root)
+            except Failure as error:
+                if not missing:
+                    raise
+                print(f"slurm/merge: {error}", file=sys.stderr)
+    return 3 if missing else 0
 
 
 def draw(directory: Path) -> None:
@@ -170,7 +187,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = Parser(prog="slurm/merge", description="Makes DIR/context.json and DIR/records.jsonl of all families that are done, lists what"
                     " is missing and why, and draws the report. May be run at any time, and again.",
                     epilog="Exit codes: 0 complete; 3 something is missing (what is there is merged and in the report); 1 the report"
-                    " or the disk failed; 2 bad input or usage.")
+                    " of a complete study, or the disk, failed; 2 bad input or usage.")
     parser.add_argument("directory", metavar="DIR", type=Path, help="the --out of slurm/submit")
     parser.add_argument("--no-report", action="store_true", help="merge only")
     options = parser.parse_args(arguments)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from . import cluster
 from .folder import Element, Family, Failure, Folder, Manifest, Result
@@ -36,10 +37,9 @@ def _state(folder: Folder, family: Family, result: Result, elements: list[Elemen
            ended: dict[Element, str]) -> State:
     if result.kind == "done":
         return State("done", f"on {(result.provenance or {}).get('node')}", family, result)
-    attempt = folder.last_attempt(family.id)
     for element in elements:
         if element in active:
-            return _queued(family, result, element, active[element], attempt)
+            return _queued(family, result, element, active[element], folder.last_attempt(family.id, element))
     if result.kind in ("failed", "damaged"):
         return State("failed", f"{'damaged: ' if result.kind == 'damaged' else ''}{result.reason}", family, result)
     if not elements:
@@ -47,20 +47,24 @@ def _state(folder: Folder, family: Family, result: Result, elements: list[Elemen
     element = elements[0]
     how = _ENDED.get(ended.get(element, ""), "")
     log = f"job {element}, {folder.slurm / 'logs' / f'{element}.out'}"
-    if attempt is None or attempt[0].get("array_job") != element.job:
+    attempt = folder.last_attempt(family.id, element)
+    if attempt is None:
         return State("failed", f"{how or 'ended'} before it began ({log})", family, result)
     where, said = attempt
     node = where.get("node", "an unknown node")
     last = said[-1] if said else "killed, or its node was lost"
+    if last in ("done", "a point failed", "done by another job in the meantime"):
+        last += ", but its result is not in slurm/families"
     if how in ("", "failed") or said and last.startswith("timed out"):
         return State("failed", f"on {node}: {last} ({log})", family, result)
     return State("failed", f"{how} on {node}{': ' + last if said else ''} ({log})", family, result)
 
 
-def _queued(family: Family, result: Result, element: Element, queued: cluster.Active, attempt: object) -> State:
+def _queued(family: Family, result: Result, element: Element, queued: cluster.Active,
+            attempt: tuple[dict[str, Any], list[str]] | None) -> State:
     if queued.is_pending:
         return State("pending", f"job {element}: {queued.reason}", family, result, in_queue=True)
-    if isinstance(attempt, tuple) and attempt[0].get("array_job") == element.job and attempt[0].get("array_task") == element.index:
+    if attempt is not None:
         where, said = attempt
         if not said:
             return State("running", f"job {element} on {where.get('node')}", family, result, in_queue=True)

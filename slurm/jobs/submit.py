@@ -3,45 +3,27 @@
 from __future__ import annotations
 
 import argparse
-import hashlib
-import json
-import math
+import contextlib
 import os
+import secrets
 import shlex
+import shutil
+import signal
 import subprocess
 import sys
 import time
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Sequence
+from typing import Any, Iterator, Sequence
 
-from . import cluster, states
-from .folder import Failure, Family, Folder, InputError, Manifest, dump, manifest_of, read_json, write_whole
+from . import cluster, options as sbatch, states
+from .folder import Failure, Folder, InputError, Manifest, dump, write_whole
+from .plan import (ROOT, Array, array_command, arrays_of, check_plan, comment_of, frozen_study, merge_command, outside, plan_of,
+                   plan_script, stored_plan)
+from .site import HERE, Site
 from .usage import Parser, guarded
 
-HERE = Path(__file__).resolve().parent.parent
-ROOT = HERE.parent
+SHORTEST_MIN = 5  # of --time, without a warning
 SCRIPTS = ("task", "step", "merge-task")
-# Options of sbatch that decide what a result means, or where submit finds it: they are not the user's.
-_OWN = {"array": "a", "cpus-per-task": "c", "nodes": "N", "ntasks": "n", "output": "o", "error": "e", "dependency": "d", "chdir": "D",
-        "job-name": "J", "signal": "", "open-mode": "", "parsable": "", "requeue": "", "no-requeue": "", "wrap": "", "test-only": "",
-        "threads-per-core": "", "hint": "", "export": "", "export-file": "", "wait": "W", "quiet": "Q", "help": "h", "version": "V"}
-
-
-@dataclass(frozen=True)
-class Array:
-    """Families of equal shape, as one array: elements[i] are those of index i."""
-
-    name: str
-    cpus: int
-    elements: tuple[tuple[Family, ...], ...]
-
-    @property
-    def tasks(self) -> str:
-        return f"{self.name}.tasks"
-
-    def lines(self) -> str:
-        return "".join(f"{index} {family.id} {family.shard}\n" for index, element in enumerate(self.elements) for family in element)
 
 
 def parser() -> Parser:
@@ -56,16 +38,18 @@ def parser() -> Parser:
     main.add_argument("--test-only", action="store_true", help="let sbatch check each array and say when it would start; submit nothing")
     main.add_argument("--per-task", metavar="K", type=whole, default=1, help="families per element of an array (default: 1)")
     main.add_argument("--at-most", metavar="N", type=whole, help="elements of an array that may run at once (default: as SLURM likes)")
-    main.add_argument("--cpus", metavar="N", type=whole, help="CPUs of a node: what `max` means (default: cores of the cluster's largest"
-                      " node; without SLURM, those of this process)")
-    main.add_argument("--isa", help="instruction set of the nodes: what `best` means (default: this CPU's)")
+    main.add_argument("--cpus", metavar="N", type=whole, help="CPUs of a node: what `max` means (default: as DIR was planned; at first cores"
+                      " of the cluster's largest node, or, without SLURM, CPUs of this process)")
+    main.add_argument("--isa", help="instruction set of the nodes: what `best` means (default: as DIR was planned; at first this CPU's)")
     main.add_argument("--no-report", action="store_true", help="let the merge job merge only; the report needs matplotlib on the node")
     main.add_argument("--shared", action="store_true", help="do not ask for whole nodes (recorded; other jobs disturb times)")
     main.add_argument("--oversubscribe", action="store_true", help="allow more threads than CPUs")
     main.add_argument("--filter", metavar="REGEX", help="only points whose name this matches, as of `rasterbench study`")
     main.add_argument("--site", metavar="SITE", default="generic", help="a name in slurm/sites, or a file (default: generic)")
-    main.add_argument("--program", metavar="FILE", type=Path, help="a rasterbench that is built already (default: build/release/bin, built"
-                      " before the arrays are submitted)")
+    main.add_argument("--program", metavar="FILE", type=Path, help="a rasterbench that is built already (default: the one with which DIR was"
+                      " begun; at first build/release/bin, built before the arrays are submitted)")
+    main.add_argument("--rebuild", action="store_true", help="build and take build/release/bin although DIR was begun with another program")
+    main.add_argument("--replan", action="store_true", help="give DIR a new plan: results that are not in it are kept aside, and not merged")
     main.add_argument("--max-array-size", metavar="N", type=whole, help="in place of the cluster's MaxArraySize (a dry run without SLURM"
                       f" takes {cluster.MAX_ARRAY_SIZE})")
     return main
@@ -86,50 +70,6 @@ def split_arguments(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
     return words[:at], words[at + 1:]
 
 
-def check_sbatch_options(options: Sequence[str]) -> None:
-    for position, word in enumerate(options):
-        name = word[2:].partition("=")[0] if word.startswith("--") else word[1:2] if word.startswith("-") and len(word) > 1 else ""
-        if word.startswith("-"):
-            for long, short in _OWN.items():
-                if name == long if word.startswith("--") else name == short and short:
-                    raise InputError(word, "slurm/submit sets this option of sbatch itself")
-        elif position == 0 or not options[position - 1].startswith("-") or "=" in options[position - 1]:
-            raise InputError(word, "is no option of sbatch; a script is not expected after --")
-
-
-class Site:
-    """A site file: bash that is read before the program runs, here and in every job."""
-
-    def __init__(self, name: str) -> None:
-        known = sorted(path.stem for path in (HERE / "sites").glob("*.sh"))
-        self.path = HERE / "sites" / f"{name}.sh" if name in known else Path(name)
-        if not self.path.is_file():
-            raise InputError("--site", f"'{name}' is neither a file nor one of {', '.join(known)}")
-        self.text = self.path.read_text(encoding="utf-8")
-
-    def run(self, command: Sequence[object]) -> str:
-        """The output of a command in the site's environment. Throws Failure; bad input of the program is InputError."""
-        return self._shell('exec "$@"', *command)
-
-    def sbatch_options(self) -> list[str]:
-        return [word for word in self._shell('printf "%s\\0" "${sbatch_options[@]}"').split("\0") if word]
-
-    def _shell(self, script: str, *words: object) -> str:
-        """Runs a script after the site file; what that prints goes to stderr."""
-        whole_script = f'. "$1" >&2 || exit 97; shift; {script}'
-        done = subprocess.run(["bash", "-c", whole_script, "bash", str(self.path.absolute()), *map(str, words)], stdout=subprocess.PIPE,
-                              stderr=subprocess.PIPE, text=True, check=False)
-        if done.returncode == 0:
-            return done.stdout
-        last = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
-        if done.returncode == 97:
-            raise InputError(self.path, f"fails: {last}")
-        if done.returncode == 2 and last.startswith("rasterbench: "):
-            place, _, problem = last.removeprefix("rasterbench: ").partition(": ")
-            raise InputError(place, problem)
-        raise Failure(f"{words[0] if words else self.path}: {last}")
-
-
 def build(site: Site) -> None:
     """Once, here: jobs that build at the same time wait for one another, or for ever, on a network file system."""
     if not (ROOT / "build/release/build.ninja").is_file():
@@ -137,77 +77,6 @@ def build(site: Site) -> None:
         site.run(["cmake", "-S", ROOT, "--preset", "release"])
     print("Building build/release", flush=True)
     site.run(["cmake", "--build", ROOT / "build/release", "--target", "rasterbench"])
-
-
-def plan_of(site: Site, program: Path, options: argparse.Namespace, cpus: int) -> Manifest:
-    """What `rasterbench study --list --json` says, with the options that the jobs need to say the same."""
-    study_options = ["--cpus", str(cpus)]
-    if options.isa:
-        study_options += ["--isa", options.isa]
-    if options.oversubscribe:
-        study_options.append("--oversubscribe")
-    if options.filter:
-        study_options += ["--filter", options.filter]
-    value = json.loads(site.run([program, "study", options.study, "--list", "--json", *study_options]))
-    if not options.isa:
-        study_options += ["--isa", value["isa"]]  # a node with wider vectors would plan other points
-    value["file"] = str(options.study.resolve())
-    value["options"] = study_options
-    manifest = manifest_of(value, program)
-    if not manifest.families:
-        raise InputError(options.study, "no point is left to run (--filter)")
-    return manifest
-
-
-def arrays_of(families: Sequence[Family], per_task: int, max_array_size: int) -> list[Array]:
-    """One array per shape, which is the largest thread count of a family; split where SLURM allows no more indices."""
-    arrays = []
-    for cpus in sorted({family.threads for family in families}):
-        same = [family for family in families if family.threads == cpus]
-        elements = [tuple(same[i:i + per_task]) for i in range(0, len(same), per_task)]
-        parts = [tuple(elements[i:i + max_array_size]) for i in range(0, len(elements), max_array_size)]
-        for number, part in enumerate(parts, start=1):
-            arrays.append(Array(f"c{cpus}" + (f"-{number}" if len(parts) > 1 else ""), cpus, part))
-    return arrays
-
-
-def array_command(array: Array, folder: Folder, submission: Path, options: argparse.Namespace, name: str, extra: Sequence[str]) -> list[str]:
-    at_most = f"%{options.at_most}" if options.at_most else ""
-    return ["sbatch", "--parsable", f"--job-name={name}-{array.name}", f"--array=0-{len(array.elements) - 1}{at_most}", "--nodes=1",
-            "--ntasks=1", f"--cpus-per-task={array.cpus}", "--threads-per-core=1", *([] if options.shared else ["--exclusive"]),
-            "--requeue", "--open-mode=append", "--signal=B:TERM@120", f"--chdir={Path.cwd()}",
-            f"--output={folder.slurm}/logs/%A_%a.out", *extra, str(submission / "task"), str(submission), array.tasks]
-
-
-def merge_command(jobs: Sequence[object], folder: Folder, submission: Path, options: argparse.Namespace, name: str,
-                  extra: Sequence[str]) -> list[str]:
-    # afterany: afterok would wait for ever after one failure, and it is the merge that says what is missing.
-    return ["sbatch", "--parsable", f"--job-name={name}-merge", f"--dependency=afterany:{':'.join(map(str, jobs))}", "--nodes=1",
-            "--ntasks=1", "--cpus-per-task=1", f"--chdir={Path.cwd()}", f"--output={folder.slurm}/logs/merge-%j.out", *extra,
-            str(submission / "merge-task"), str(submission), str(ROOT), str(folder.root), *(["--no-report"] if options.no_report else [])]
-
-
-def plan_script(folder: Folder, manifest: Manifest, program: Path) -> str:
-    """What task and step read."""
-    digest = hashlib.sha256(str(folder.root).encode()).hexdigest()[:8]
-    values = {"dir": folder.root, "study": manifest.value["file"], "program": program, "cwd": Path.cwd(),
-              "scratch_name": f"rasterbench-{folder.root.name}-{digest}"}
-    lines = [f"{name}={shlex.quote(str(value))}\n" for name, value in values.items()]
-    return "".join(lines) + f"options=({' '.join(map(shlex.quote, manifest.value['options']))})\n"
-
-
-def check_folder(folder: Folder, study: str) -> Manifest | None:
-    """The plan that DIR has already."""
-    if folder.root.exists() and not folder.root.is_dir():
-        raise InputError(folder.root, "is not a folder")
-    if not folder.manifest_path.exists():
-        if (folder.root / "journal.jsonl").exists() or (folder.root / "records.jsonl").exists():
-            raise InputError(folder.root, "holds a study that was not submitted from here: choose another --out")
-        return None
-    manifest = folder.manifest()
-    if manifest.value["study"] != study:
-        raise InputError(folder.root, f"holds the study '{manifest.value['study']}', not '{study}': choose another --out")
-    return manifest
 
 
 def copy_program(program: Path, folder: Folder, build_id: str) -> Path:
@@ -219,47 +88,85 @@ def copy_program(program: Path, folder: Folder, build_id: str) -> Path:
     return target
 
 
-def set_aside(folder: Folder, state: states.State) -> None:
-    """A result that is run again is kept under another name: task skips what is there."""
-    path = folder.slurm / "families" / state.family.id
+def set_aside(path: Path, kind: str) -> Path | None:
+    """A result that is run again is kept under another name, which is given: task skips what is there."""
     if not path.exists():
-        return
+        return None
     number = 1
-    while (target := path.with_name(f"{path.name}.{state.result.kind}-{number}")).exists():
+    while (target := path.with_name(f"{path.name}.{kind}-{number}")).exists():
         number += 1
-    path.rename(target)
+    return path.rename(target)
+
+
+@contextlib.contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Ctrl-C, a lost connection and kill wait, for sbatch too: none comes between a job and its id."""
+    signals = {signal.SIGINT, signal.SIGHUP, signal.SIGTERM}
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, signals)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def run(options: argparse.Namespace, sbatch_options: list[str]) -> int:
     if not options.study.is_file():
         raise InputError(options.study, "no such study file")
-    check_sbatch_options(sbatch_options)
+    for path in (options.study, options.out):
+        try:
+            str(path.absolute()).encode()
+        except UnicodeEncodeError:
+            raise InputError(repr(str(path)), "its name is not UTF-8: choose another") from None
+    user_options = sbatch.parsed(sbatch_options)
     folder, site = Folder(options.out), Site(options.site)
-    extra = site.sbatch_options() + sbatch_options
+    site_options = sbatch.parsed(site.sbatch_options())
+    extra = sbatch.joined(site_options, user_options)
+    warn_of_short_time([*site_options, *user_options])
+    old = stored_plan(folder)
     offline = options.dry_run and not cluster.answers()
     if not offline and not cluster.is_installed():
         raise Failure("sbatch and squeue are not on the PATH: is this a login node of a cluster? --dry-run works without")
     for variable in cluster.ignored_variables():
         print(f"slurm/submit: {variable} of the environment is left out; give the option after --", file=sys.stderr)
-    program = options.program or ROOT / "build/release/bin/rasterbench"
-    if not options.program and not options.dry_run:
-        build(site)
-    if not program.is_file():
-        raise InputError(program, "no such program: build it first (scripts/setup, or README, On a cluster)")
+    program = program_of(site, folder, old, options)
 
-    cpus = options.cpus
+    cpus = options.cpus or (old.value["cpus"] if old and not options.replan else None)
     if cpus is None:
         cpus = len(os.sched_getaffinity(0)) if offline else cluster.cores_of_nodes()
         print(f"slurm/submit: planned for {cpus} CPUs, {'those of this process' if offline else 'the cores of the largest node'}"
               " (--cpus)", file=sys.stderr)
-    manifest = plan_of(site, program, options, cpus)
+    isa = options.isa or (old.value["isa"] if old and not options.replan else None)
+    manifest = plan_of(site, program, options.study, options, cpus, isa)
     size = options.max_array_size or (cluster.MAX_ARRAY_SIZE if offline else cluster.max_array_size())
     name = str(manifest.value["study"]).replace(" ", "_")
-    check_folder(folder, manifest.value["study"])
+    if old:
+        check_plan(folder, old, manifest, options.replan)
     if options.dry_run or options.test_only:
         return show(folder, manifest, options, extra, size, name, offline)
     with folder.lock("submit"):
         return submit(folder, manifest, site, program, options, extra, size, name)
+
+
+def warn_of_short_time(given: Sequence[sbatch.Option]) -> None:
+    limits = [sbatch.minutes(option.value or "") for option in given if option.name == "time"]
+    if limits and limits[-1] is not None and limits[-1] < SHORTEST_MIN:
+        print(f"slurm/submit: --time: jobs of less than {SHORTEST_MIN} minutes get TERM, 2 minutes before their end, when they have hardly"
+              " begun, and are requeued three times for little", file=sys.stderr)
+
+
+def program_of(site: Site, folder: Folder, old: Manifest | None, options: argparse.Namespace) -> Path:
+    """To resume is to go on with the program that DIR was begun with: points of another build are other points."""
+    if options.program:
+        program = options.program.resolve()
+    else:
+        program = folder.slurm / "programs" / old.build_id / "rasterbench" if old else Path()
+        if options.rebuild or options.replan or not program.is_file():
+            program = ROOT / "build/release/bin/rasterbench"
+            if not options.dry_run:
+                build(site)
+    if not program.is_file():
+        raise InputError(program, "no such program: build it first (scripts/setup, or README, On a cluster)")
+    return program
 
 
 def describe(manifest: Manifest, arrays: Sequence[Array], everything: Sequence[states.State]) -> None:
@@ -281,10 +188,11 @@ def to_submit(folder: Folder, manifest: Manifest, ask_slurm: bool) -> tuple[list
 
 def show(folder: Folder, manifest: Manifest, options: argparse.Namespace, extra: list[str], size: int, name: str, offline: bool) -> int:
     everything, missing = to_submit(folder, manifest, not offline)
-    arrays = arrays_of([s.family for s in missing], options.per_task, size)
+    arrays = arrays_of([s.family for s in missing], options.per_task, size, manifest.value["cpus"])
     describe(manifest, arrays, everything)
     submission = folder.slurm / "submissions" / str(max(folder.submissions(), default=0) + 1)
-    commands = [array_command(array, folder, submission, options, name, extra) for array in arrays]
+    token = secrets.token_hex(4)
+    commands = [array_command(array, folder, submission, options, name, token, extra) for array in arrays]
     if options.test_only:
         # --output names a folder that is not there yet; sbatch reads the script, so it is the one of this checkout.
         for command in commands:
@@ -298,7 +206,7 @@ def show(folder: Folder, manifest: Manifest, options: argparse.Namespace, extra:
     for array, command in zip(arrays, commands):
         print(shlex.join(command))
     if arrays:
-        print(shlex.join(merge_command([f"JOB_{array.name}" for array in arrays], folder, submission, options, name, extra)))
+        print(shlex.join(merge_command([f"JOB_{array.name}" for array in arrays], folder, submission, options, name, token, extra)))
         print(f"\n# plan: {folder.manifest_path}")
         for array in arrays:
             print(f"# {submission / array.tasks}\n{array.lines()}", end="")
@@ -307,10 +215,19 @@ def show(folder: Folder, manifest: Manifest, options: argparse.Namespace, extra:
 
 def submit(folder: Folder, manifest: Manifest, site: Site, program: Path, options: argparse.Namespace, extra: list[str], size: int,
            name: str) -> int:
+    find_lost_jobs(folder)
     everything, missing = to_submit(folder, manifest, True)
-    arrays = arrays_of([s.family for s in missing], options.per_task, size)
+    arrays = arrays_of([s.family for s in missing], options.per_task, size, manifest.value["cpus"])
     describe(manifest, arrays, everything)
+    planned = {family.id for family in manifest.families}
+    stale = cluster.active([e for family, found in folder.elements().items() if family not in planned for e in found])
+    if stale:
+        jobs = " ".join(sorted({str(element.job) for element in stale}))
+        print(f"slurm/submit: of an earlier plan, still in the queue: scancel {jobs}", file=sys.stderr)
+    for path in outside(folder, manifest):
+        print(f"slurm/submit: of an earlier plan, kept: {set_aside(path, 'replanned')}")
     write_whole(folder.manifest_path, dump(manifest.value))
+    submit_lost_merges(folder, options, name, extra)
     if not arrays:
         print("nothing to submit" + ("" if all(s.kind == "done" for s in everything) else ": what is missing is in the queue"))
         return 0
@@ -322,43 +239,103 @@ def submit(folder: Folder, manifest: Manifest, site: Site, program: Path, option
         write_whole(submission / script, (HERE / script).read_bytes())
         (submission / script).chmod(0o755)
     write_whole(submission / "site.sh", site.text)
-    write_whole(submission / "plan.sh", plan_script(folder, manifest, copied))
+    write_whole(submission / "plan.sh", plan_script(folder, manifest, frozen_study(site, copied, submission, options, manifest), copied))
     write_whole(submission / "manifest.json", dump(manifest.value))
     for array in arrays:
         write_whole(submission / array.tasks, array.lines())
-    for state in missing:
-        set_aside(folder, state)
-    return submit_arrays(folder, submission, arrays, options, name, extra)
+    for state in missing:  # what a killed job had half copied
+        for part in (folder.slurm / "families").glob(f".{state.family.id}.*"):
+            shutil.rmtree(part)
+    return submit_arrays(folder, submission, arrays, {s.family.id: s for s in missing}, options, name, extra)
 
 
-def submit_arrays(folder: Folder, submission: Path, arrays: Sequence[Array], options: argparse.Namespace, name: str,
-                  extra: list[str]) -> int:
+def submit_arrays(folder: Folder, submission: Path, arrays: Sequence[Array], missing: dict[str, states.State],
+                  options: argparse.Namespace, name: str, extra: list[str]) -> int:
     """Job ids are written down one by one: whatever stops this, the next submit knows what is in the queue."""
-    record = {"schema": 1, "submitted": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()), "arrays": [], "merge": None}
-    problem: Failure | None = None
+    token = secrets.token_hex(4)
+    record: dict[str, Any] = {"schema": 1, "submitted": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()), "token": token, "arrays": [],
+                              "merge": None}
+    path = submission / "submission.json"
     for array in arrays:
-        command = array_command(array, folder, submission, options, name, extra)
-        try:
-            job = cluster.sbatch(command)
-        except Failure as error:
-            problem = error
-            break
-        record["arrays"].append({"tasks": array.tasks, "cpus": array.cpus, "elements": len(array.elements), "job": job,
-                                 "command": command})
-        try:
-            write_whole(submission / "submission.json", dump(record))
-        except OSError:
-            cluster.ask(["scancel", str(job)])  # or nobody would know of it
-            raise
-        print(f"submitted {array.name} as job {job}")
-    jobs = [entry["job"] for entry in record["arrays"]]
+        record["arrays"].append({"tasks": array.tasks, "cpus": array.cpus, "elements": len(array.elements), "job": None,
+                                 "command": array_command(array, folder, submission, options, name, token, extra)})
+    write_whole(path, dump(record))
+    problem: Failure | None = None
+    for array, entry in zip(arrays, record["arrays"]):
+        with uninterrupted():
+            # Before sbatch: an element that starts at once would skip what is there.
+            aside = [(folder.slurm / "families" / family.id, missing[family.id].result.kind)
+                     for element in array.elements for family in element]
+            moved = [(place, target) for place, kind in aside if (target := set_aside(place, kind))]
+            try:
+                entry["job"] = submitted(entry["command"], comment_of(token, array.name))
+            except Failure as error:
+                for place, target in moved:
+                    target.rename(place)
+                problem = error
+                break
+            try:
+                write_whole(path, dump(record))
+            except OSError:
+                cluster.ask(["scancel", str(entry["job"])])  # or nobody would know of it
+                raise
+        print(f"submitted {array.name} as job {entry['job']}")
+    jobs = [entry["job"] for entry in record["arrays"] if entry["job"] is not None]
     if jobs:
-        record["merge"] = cluster.sbatch(merge_command(jobs, folder, submission, options, name, extra))
-        write_whole(submission / "submission.json", dump(record))
+        submit_merge(folder, submission, record, options, name, extra)
         print(f"submitted merge as job {record['merge']}; slurm/status {shlex.quote(str(folder.root))} says how far it is")
     if problem:
         raise Failure(f"{problem}; {len(jobs)} of {len(arrays)} arrays are submitted: run the same command again for the rest")
     return 0
+
+
+def submitted(command: Sequence[str], comment: str) -> int:
+    """The job's id, also where sbatch was given up and the controller took the job all the same. Throws Failure."""
+    try:
+        return cluster.sbatch(command)
+    except cluster.NoAnswer:
+        job = cluster.jobs_by_comment().get(comment)
+        if job is None:
+            raise
+        return job
+
+
+def submit_merge(folder: Folder, submission: Path, record: dict[str, Any], options: argparse.Namespace, name: str,
+                 extra: Sequence[str]) -> None:
+    jobs = [entry["job"] for entry in record["arrays"] if entry["job"] is not None]
+    with uninterrupted():
+        record["merge"] = submitted(merge_command(jobs, folder, submission, options, name, record["token"], extra),
+                                    comment_of(record["token"], "merge"))
+        write_whole(submission / "submission.json", dump(record))
+
+
+def unfinished(folder: Folder) -> Iterator[tuple[Path, dict[str, Any]]]:
+    """Submissions that have no job for an array or for the merge."""
+    for number in folder.submissions():
+        record = folder.submission(number)
+        if isinstance(record.get("token"), str) and None in [record.get("merge"), *(entry["job"] for entry in record["arrays"])]:
+            yield folder.slurm / "submissions" / str(number), record
+
+
+def find_lost_jobs(folder: Folder) -> None:
+    """Writes down jobs that were taken after sbatch had been given up, or while submit was killed: they are not missing."""
+    open_ones = list(unfinished(folder))
+    known = cluster.jobs_by_comment() if open_ones else {}
+    for submission, record in open_ones:
+        for entry in record["arrays"]:
+            if entry["job"] is None:
+                entry["job"] = known.get(comment_of(record["token"], entry["tasks"].removesuffix(".tasks")))
+        record["merge"] = record.get("merge") or known.get(comment_of(record["token"], "merge"))
+        write_whole(submission / "submission.json", dump(record))
+
+
+def submit_lost_merges(folder: Folder, options: argparse.Namespace, name: str, extra: Sequence[str]) -> None:
+    """The merge job of arrays that are in the queue, where sbatch refused it when they were submitted."""
+    for submission, record in unfinished(folder):
+        elements = [element for found in folder.elements().values() for element in found if str(element.submission) == submission.name]
+        if record.get("merge") is None and cluster.active(elements):
+            submit_merge(folder, submission, record, options, name, extra)
+            print(f"submitted merge of submission {submission.name} as job {record['merge']}")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
