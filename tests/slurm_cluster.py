@@ -61,7 +61,7 @@ class Cluster:
             yield cls(done.stdout.strip().partition("SLURM_CONF=")[2])
         finally:
             subprocess.run([ROOT / "slurm/local", "stop", folder], env=without_slurm(), timeout=TIMEOUT, check=True)
-            shutil.rmtree(parent)
+            parent.rmdir()  # stop leaves nothing
 
     def environment(self, **changes: str) -> dict[str, str]:
         # An installed sbatch without a cluster has an empty configuration; one that is not there would be waited for.

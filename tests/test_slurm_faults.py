@@ -322,19 +322,22 @@ def test_the_latest_attempt_is_not_that_of_the_fastest_clock(jobs: Any, out: Pat
     assert jobs.folder.Folder(out).last_attempt("f", jobs.folder.Element(1, 8, 1)) is None
 
 
-@pytest.mark.parametrize("name, text, word", [
-    ("submissions/1/submission.json", "{}", "arrays"), ("submissions/1/submission.json", '{"arrays": [{"tasks": "c4.tasks"}]}', "arrays"),
-    ("submissions/1/submission.json", '{"arrays": [7]}', "arrays"), ("submissions/1/c4.tasks", "0 x 1/2\n1 x\n", "c4.tasks:2"),
-    ("submissions/1/c4.tasks", "x y z\n", "c4.tasks:1")])
-def test_a_damaged_dir_is_one_line(name: str, text: str, word: str, fake: Fake, study: Path, out: Path) -> None:
+def test_a_damaged_dir_is_one_line(fake: Fake, study: Path, out: Path) -> None:
     fake.submit(study, out, "--program", program()).ok()
     (out / "slurm/submissions/²").mkdir()
     for command in ("status", "merge"):
         assert fake.run(ROOT / "slurm" / command, out).code == 3
-    (out / "slurm" / name).write_text(text)
-    for command in ("status", "merge"):
-        one_line(fake.run(ROOT / "slurm" / command, out), f"slurm/{command}", 2, [Path(name).name, word])
-    one_line(fake.submit(study, out), "slurm/submit", 2, [Path(name).name, word])
+    for name, text, word in (("submission.json", "{}", "arrays"), ("submission.json", '{"arrays": [{"tasks": "c4.tasks"}]}', "arrays"),
+                             ("submission.json", '{"arrays": [7]}', "arrays"), ("c4.tasks", "0 x 1/2\n1 x\n", "c4.tasks:2"),
+                             ("c4.tasks", "x y z\n", "c4.tasks:1")):
+        path = out / "slurm/submissions/1" / name
+        before = path.read_text()
+        path.write_text(text)
+        one_line(fake.run(ROOT / "slurm/status", out), "slurm/status", 2, [name, word])
+        path.write_text(before)
+    path.write_text("x\n")
+    one_line(fake.run(ROOT / "slurm/merge", out), "slurm/merge", 2, ["c4.tasks:1"])
+    one_line(fake.submit(study, out), "slurm/submit", 2, ["c4.tasks:1"])
 
 
 # Scripts.

@@ -189,6 +189,8 @@ def test_merged_files_are_a_study_and_say_where_they_come_from(finished: Path) -
     (lambda f: (f / "records.jsonl").write_text("[]\n"), ["damaged"]),
     (lambda f: (f / "context.json").write_text("{"), ["damaged", "context.json"]),
     (lambda f: edit(f / "context.json", lambda c: c["program"].update(build_id="other")), ["damaged", "another program"]),
+    (lambda f: edit(f / "context.json", lambda c: c.pop("machine")), ["damaged", "machine"]),
+    (lambda f: edit(f / "context.json", lambda c: c.update(started=7)), ["damaged", "started"]),
     (lambda f: (f / "provenance.json").unlink(), ["damaged", "provenance.json"]),
     (lambda f: edit(f / "provenance.json", lambda p: p.update(family="other")), ["damaged", "another family"]),
     (lambda f: shutil.rmtree(f), ["not submitted"]),
@@ -231,6 +233,14 @@ def test_a_report_that_cannot_be_drawn_is_said(finished: Path, tmp_path: Path) -
     (finished / "figures").write_text("in the way")
     said = NOWHERE.merge(finished)
     assert said.code == 1 and "the records are merged, but the report was not drawn" in said.stderr and records(finished)
+
+
+def test_a_report_that_fails_does_not_hide_what_is_missing(finished: Path) -> None:
+    (finished / "figures").write_text("in the way")
+    shutil.rmtree(finished / "slurm/families" / manifest(finished)["families"][0]["id"])
+    said = NOWHERE.merge(finished)
+    assert said.code == 3 and "report was not drawn" in said.stderr.splitlines()[-1]
+    assert [line for line in said.stderr.splitlines() if "incomplete: 1 of 3" in line]
 
 
 def test_ctrl_c_is_one_line(study: Path, tmp_path: Path) -> None:

@@ -69,10 +69,10 @@ def state_of(outcome_text: str, family: str) -> str:
 # From submit to report.
 
 def test_from_submit_to_report_with_one_failure(cluster: Cluster, tmp_path: Path) -> None:
-    """A failure is named, exactly it is submitted again, and then the study is complete. Spaces in every path."""
+    """A failure is named, exactly it is submitted again, and then the study is complete. Spaces in every path, and a % for sbatch."""
     folder = tmp_path / "a study"
     folder.mkdir()
-    study, out = tiny(folder / "tiny study.toml"), folder / "out put"
+    study, out = tiny(folder / "tiny study.toml"), folder / "out 50%j put"
     planned = cluster.submit(study, out, "--oversubscribe", "--dry-run").ok()
     assert not out.exists(), "a dry run wrote something"
 
