@@ -9,8 +9,8 @@ from matplotlib.lines import Line2D
 from .. import captions, raster_loop, style, text
 from ..comparison import Analysis, Group
 from ..load import Record
-from ..raster_loop import RasterLoop
 from ..lost_time import older_remark
+from ..raster_loop import RasterLoop
 from .common import Block, Drawing, Row, drawn_together, execution_rows, named, pages, part, row_frame
 
 SECTION = "Balance of the threads"

@@ -12,7 +12,8 @@ from matplotlib.patches import Patch
 from .. import captions, style, text
 from ..comparison import Analysis, Group
 from ..load import Record
-from .balance import SECTION, busy, imbalance
+from ..raster_loop import busy
+from .balance import SECTION, imbalance
 from .common import Drawing, drawn_together, named, part
 
 COLUMNS = 3
