@@ -56,6 +56,9 @@ Process::Process(const std::vector<std::string>& arguments,
     setpgid(0, 0);
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (getppid() != parent) _exit(127);
+    // A batch system sends TERM to all processes of a job: what it stops is the coordinator's decision, and a
+    // runner that died of it would be taken for a point that failed.
+    signal(SIGTERM, SIG_IGN);
     dup2(request[0], STDIN_FILENO);
     dup2(answer[1], STDOUT_FILENO);
     execve(argv[0], argv.data(), envp.data());
