@@ -18,7 +18,7 @@ from scipy import stats
 
 from . import contexts, sidecars, statistics, style, text, writing
 from .captions import Caption, Facts
-from .compare import AMBIGUOUS, CHOSEN, FASTER, LOST, SAME, SLOWER, DECIDED_SHARE, VERDICTS, Outcome, Row, Run, common_shift
+from .compare import AMBIGUOUS, CHOSEN, FASTER, SAME, SLOWER, DECIDED_SHARE, VERDICTS, Outcome, Row, Run, common_shift
 from .figures import common
 from .tables import Table
 

@@ -85,7 +85,7 @@ TEST_F(RunTest, RasterLoopIsSharedWithinEachSample) {
     event["answer"]["per_thread"] = i % 2 == 0 ? Json{thread, other} : Json{other, thread};
     apply_event(event, states_[0]);
   }
-  const Json record = make_record(states_[0], study_, 1.5, "context");
+  const Json record = make_record(states_[0], study_, 1.5, Topology({}), "context");
   EXPECT_EQ(record.at("per_thread").at(0).at("busy_ms"), record.at("per_thread").at(1).at("busy_ms"));
   EXPECT_EQ(
       record.at("raster_loop"),
@@ -99,7 +99,8 @@ TEST_F(RunTest, RasterLoopIsNeverLessThanEven) {
   const Json thread = event.at("answer").at("per_thread").at(0);
   event["answer"]["per_thread"] = Json{thread, thread, thread};
   apply_event(event, states_[0]);
-  EXPECT_EQ(make_record(states_[0], study_, 1.5, "c").at("raster_loop").at("imbalance_ms"), 0.0);
+  EXPECT_EQ(make_record(states_[0], study_, 1.5, Topology({}), "c").at("raster_loop").at("imbalance_ms"),
+            0.0);
 }
 
 TEST_F(RunTest, FailureHidesTheSpeed) {
