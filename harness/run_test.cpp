@@ -78,8 +78,10 @@ TEST_F(RunTest, RasterLoopIsSharedWithinEachSample) {
   apply_event(verify(), states_[0]);
   for (int i = 0; i < 8; ++i) {
     Json event = sample(i, 12);
-    Json thread{{"busy_ms", 10}, {"idle_ms", 1}, {"iterations", 4}, {"chunks", 2}, {"cpu", 0}},
-        other = thread;
+    Json thread = event.at("answer").at("per_thread").at(0);
+    thread["busy_ms"] = 10;
+    thread["idle_ms"] = 1;
+    Json other = thread;
     other["busy_ms"] = 5;
     other["idle_ms"] = 6;
     event["answer"]["per_thread"] = i % 2 == 0 ? Json{thread, other} : Json{other, thread};
