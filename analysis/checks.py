@@ -13,6 +13,7 @@ from .load import Record, Study
 from .raster_loop import busy
 from .severity import GRAVE, NOTE
 from .statistics import is_close
+from .steadiness import placement
 
 NOT_PUBLISHABLE = "not publishable"  # what the report calls a grave one
 P95_SAMPLES = 59  # with fewer, the 95th percentile of a sample says nothing with 95 % confidence
@@ -165,12 +166,6 @@ def watched_noise(study: Study) -> dict[str, Any] | None:
 def _noise(analysis: Analysis) -> Iterator[Warn]:
     for warning in (watched_noise(analysis.study) or {}).get("warnings", ()):
         yield Warn(severity.BUSY_MACHINE, f"noisy machine while sampling: {warning}.")
-
-
-def placement(record: Record) -> dict[str, Any] | None:
-    """Where the threads of a point were seen; None where nobody looked."""
-    found = record.raw.get("placement")
-    return found if isinstance(found, dict) else None
 
 
 def sharing(study: Study, record: Record) -> str:

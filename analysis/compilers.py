@@ -266,7 +266,7 @@ def write(found: Comparison) -> list[Path]:
     files: dict[str, str | bytes] = {f"{made.name}.csv": made.csv(), f"{made.name}.tex": made.tex(), f"{made.name}.txt": plain(found) + "\n"}
     with matplotlib.rc_context(style.RC):
         for drawn in drawing.draw(found):
-            files |= sidecars.files(drawn, found.base_study.records_hash)
+            files |= sidecars.files(drawn, *sidecars.drawn_from(found.base_study.directory / "records.jsonl", found.folder))
             files[f"{drawn.name}.txt"] = f"{drawn.caption.plain}\n{drawn.caption.reading}\n"
     read = [found.plan_file, *(found.folder / name / file for name in found.studies for file in ("records.jsonl", "context.json", "judged.json"))]
     writing.write_folder(found.folder, files, "compilers", read)

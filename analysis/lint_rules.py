@@ -10,7 +10,7 @@ from typing import Any, Iterator
 import numpy as np
 from scipy import stats
 
-from . import checks, hypotheses, lint_figures, severity, statistics, text, weak
+from . import checks, hypotheses, lint_figures, severity, statistics, steadiness, text, weak
 from .lint import Finding, Folder, Rule
 from .load import Record
 from .raster_loop import busy
@@ -223,7 +223,7 @@ def set_up(folder: Folder) -> Iterator[Finding]:
             yield folder.record(record, severity.NOT_PINNED, "its threads were not pinned", "add binding = [\"close\"] to the study")
         if record.config.is_peer:
             continue  # its threads are its own
-        placement = checks.placement(record)
+        placement = steadiness.placement(record)
         if placement is None:
             yield folder.record(record, severity.NOT_WATCHED, "where its threads ran was not observed", "run the study again: each sample looks")
         elif placement.get("binding") not in (None, "kept"):

@@ -10,12 +10,13 @@ the target, so that the grain of the clock makes none; from ten samples on.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Sequence
+from typing import Any, Sequence
 
 import numpy as np
 from scipy import stats
 
 from . import statistics, text
+from .load import Record
 from .statistics import Samples
 
 LEVEL = 0.05  # of drift, over all points of a study
@@ -74,3 +75,9 @@ def _change(values: np.ndarray) -> float:
     taken = np.unique(np.linspace(0, len(values) - 1, min(len(values), MOST_SLOPES)).round().astype(int))
     slope = stats.theilslopes(values[taken], taken).slope
     return float(slope * (len(values) - 1) / np.median(values))
+
+
+def placement(record: Record) -> dict[str, Any] | None:
+    """Where the threads of a point were seen; None where nobody looked."""
+    found = record.raw.get("placement")
+    return found if isinstance(found, dict) else None

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from . import checks, latex, statistics, steadiness, text
+from . import latex, statistics, steadiness, text
 from .comparison import EXTRA_AXES, GROUP_AXES, Analysis, Group, strategy
 from .load import Record
 from .statistics import Comparison, Estimate
@@ -143,7 +143,7 @@ def _measured(analysis: Analysis, record: Record, comparison: Comparison) -> dic
     row: dict[str, Any] = columns("median_ms", analysis.estimates[record.id])
     row |= {"n": record.samples.n, "launches": record.samples.launch_count, "interval": analysis.estimates[record.id].kind,
             "stop": record.stop, "accuracy": accuracy(record)}
-    steady, where = analysis.steadiness[record.id], checks.placement(record) or {}
+    steady, where = analysis.steadiness[record.id], steadiness.placement(record) or {}
     row |= {"drift": steady.drift, "drift_p_holm": steady.p_holm, "outliers": steady.outliers,
             **{key: where.get(key) for key in ("migrations", "samples_sharing_core")}}
     row |= columns("time_over_fastest", comparison.ratio if comparison.verdict != "best" else None)

@@ -87,6 +87,7 @@ std::string google_benchmark_report(std::span<const Json> records, const std::st
   reporter->SetOutputStream(&text);
   reporter->SetErrorStream(&text);
   Reporter::Context context;
+  context.name_field_width = 0;  // Google Benchmark 1.7.1 leaves it as it finds it
   for (const Json& record : records)
     context.name_field_width =
         std::max(context.name_field_width, record.at("name").get<std::string>().size());

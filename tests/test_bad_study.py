@@ -102,7 +102,7 @@ def test_the_study_is_good_before_it_is_spoilt(folder: Path) -> None:
     ("threads", 'threads = "1..mx"', ["threads: ", "did you mean '1..max'"]),
     ("binding", 'binding = "closed"', ["binding: ", "did you mean 'close'"]),
     ("wait_policy", 'wait_policy = "activ"', ["wait_policy: ", "did you mean 'active'"]),
-    ("runtime", 'runtime = "libiomp"', ["runtime: ", "did you mean 'libomp'"]),
+    ("runtime", 'runtime = "libomp5"', ["runtime: ", "did you mean 'libomp'"]),
     ("tile", "tile = 0", ["tile: "]),
     ("tile", "tile = 16.0", ["tile: "]),
     ("cache", 'cache = "hot"', ["cache: "]),

@@ -89,7 +89,8 @@ def test_every_study_of_the_list_can_be_planned() -> None:
         pytest.skip("these programs lie in no build folder of a checkout")
     assert {s["name"] for s in studies} == {path.stem for path in (ROOT / "studies").glob("*.toml")}
     for s in studies:
-        outcome = run("study", s["file"], "--dry-run", "--size", "64x48", "--filter", "teapot").ok()
+        size = [] if s["name"] == "weak" else ["--size", "64x48"]  # that one grows with the threads
+        outcome = run("study", s["file"], "--dry-run", *size, "--filter", "teapot").ok()
         assert f"{s['name']}: " in outcome.stdout
 
 

@@ -125,13 +125,10 @@ def states_of_a_planned_study(words: list[str]) -> list[list[str]]:
 
 
 def of_small_costs(words: list[str]) -> list[list[str]]:
-    """A few invented costs; without a study, which whatif_test.py compares with. Short sleeps."""
-    costs = {"unit": "row", "iterations": 40, "size": [64, 48], "kernel": "row_parallel", "numeric": "f32", "threads": 2,
+    """A few invented costs, and short sleeps."""
+    costs = {"schema": 1, "unit": "row", "iterations": 40, "size": [64, 48], "kernel": "row_parallel", "numeric": "f32", "threads": 2,
              "cost_us": [1.0 + i % 7 for i in range(40)]}
-    if "--measured" in words:
-        k = words.index("--measured")
-        words = words[:k] + words[k + 2:]
-    else:
+    if "replay" in words:
         words = [*words, "--seconds", "0.05"]
     return [["bash", "-c", f"echo {shlex.quote(json.dumps(costs))} > costs.json"], words]
 

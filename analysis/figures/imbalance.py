@@ -13,7 +13,7 @@ from .. import captions, style, text
 from ..comparison import Analysis, Group
 from ..load import Record
 from ..raster_loop import busy
-from .balance import SECTION, imbalance
+from .balance import SECTION, imbalance, loop
 from .common import Drawing, drawn_together, named, part
 
 COLUMNS = 3
@@ -34,7 +34,7 @@ def draw(analysis: Analysis) -> Iterator[Drawing]:
 
 def chosen(analysis: Analysis, group: Group) -> list[Record]:
     """The fastest point of each kernel at the highest thread count of the group that has busy times."""
-    records = [r for r in group.timed if busy(r)]
+    records = [r for r in group.timed if loop(r)]
     threads = max((r.config.threads for r in records), default=0)
     found = [analysis.fastest([r for r in records if r.config.kernel == kernel and r.config.threads == threads]) for kernel in group.kernels]
     return [record for record in found if record is not None]

@@ -207,7 +207,7 @@ def test_repeats_are_said_and_checked(tmp_path, capsys):
 
 
 def test_few_points_that_moved_together_are_said():
-    outcome = compare.compare(many_points(1, 2, 10, 5, 1), many_points(1.1, 2, 10, 5, 2))
+    outcome = compare.compare(many_points(1, 8, 10, 5, 1), many_points(1.1, 8, 10, 5, 2))
     assert "every point moved" in comparison_output.plain(outcome)
 
 

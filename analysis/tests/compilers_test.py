@@ -150,6 +150,7 @@ def test_the_figure_breaks_no_rule(folder: Path) -> None:
 
     class Folder:
         figures, undescribed, study = [("compilers_ratio.json", figure)], [], found.base_study
+        source = staticmethod(lambda file, figure: found.base_study.directory / "records.jsonl")
 
     for rule in (lint_figures.caption, lint_figures.base, lint_figures.lines, lint_figures.legible, lint_figures.grey, lint_figures.current):
         assert list(rule(Folder)) == [], rule.__name__

@@ -116,7 +116,7 @@ def test_a_trace_is_never_written_over(tmp_path: Path, capsys: pytest.CaptureFix
     value["metadata"]["image"]["file"] = "cost.png"
     path.write_text(json.dumps(value))
     before = (tmp_path / "cost.png").read_bytes()
-    assert program.main(["trace", str(path)]) == 2
+    assert program.main(["trace", str(path), "--out", str(tmp_path)]) == 2
     assert "cost.png" in capsys.readouterr().err and (tmp_path / "cost.png").read_bytes() == before
 
 
