@@ -111,22 +111,25 @@ class SelectionReader {
     for (const WeakSeries& series : from_.weak) scenes.insert(series.scene);
     words("scene", [this, scenes](const std::string& word) {
       if (!from_.replaced) check_word(word, {scenes.begin(), scenes.end()}, "scene");
-      return [this, word](const Point& p) {
-        return p.scene.name == word || in_series(p, [&](const WeakSeries& s) { return s.scene == word; });
+      return [&from = from_, word](const Point& p) {
+        return p.scene.name == word ||
+               in_series(from, p, [&](const WeakSeries& s) { return s.scene == word; });
       };
     });
     words("size", [this](const std::string& word) -> Test {
       if (word.ends_with(kTimesThreads))
-        return [this, word](const Point& p) {
-          return in_series(p, [&](const WeakSeries& s) { return s.size == word; });
+        return [&from = from_, word](const Point& p) {
+          return in_series(from, p, [&](const WeakSeries& s) { return s.size == word; });
         };
       return
           [size = parse_size(word, "size")](const Point& p) { return std::pair(p.width, p.height) == size; };
     });
   }
 
-  bool in_series(const Point& point, const std::function<bool(const WeakSeries&)>& is_meant) const {
-    return std::any_of(from_.weak.begin(), from_.weak.end(),
+  /// The conditions outlive this reader, but not `from`.
+  static bool in_series(const Selectable& from, const Point& point,
+                        const std::function<bool(const WeakSeries&)>& is_meant) {
+    return std::any_of(from.weak.begin(), from.weak.end(),
                        [&](const WeakSeries& series) { return is_meant(series) && series.has(point); });
   }
 
