@@ -124,13 +124,18 @@ def median_estimate(samples: Samples) -> Estimate:
     return Estimate(value, *bounds, samples.n, "order statistics")
 
 
-def paired(numerator: Samples, denominator: Samples) -> list[np.ndarray]:
-    """Ratios of the samples that share launch and block, one array a launch."""
+def paired_by_launch(numerator: Samples, denominator: Samples) -> dict[int, np.ndarray]:
+    """launch: ratios of the samples that share it and a block."""
     above, below = numerator.by_block(), denominator.by_block()
     launches: dict[int, list[float]] = {}
     for key in sorted(above.keys() & below.keys()):
         launches.setdefault(key[0], []).append(above[key] / below[key])
-    return [np.array(ratios) for ratios in launches.values()]
+    return {launch: np.array(ratios) for launch, ratios in launches.items()}
+
+
+def paired(numerator: Samples, denominator: Samples) -> list[np.ndarray]:
+    """Ratios of the samples that share launch and block, one array a launch."""
+    return list(paired_by_launch(numerator, denominator).values())
 
 
 def paired_samples(numerator: Samples, denominator: Samples) -> Samples:
@@ -355,11 +360,7 @@ def _launch_p(logs: np.ndarray, pooled: float, freedom: int) -> float:
 
 def launch_log_ratios(numerator: Samples, denominator: Samples) -> dict[int, float]:
     """launch: mean of the logarithms of the paired ratios."""
-    above, below = numerator.by_block(), denominator.by_block()
-    launches: dict[int, list[float]] = {}
-    for key in sorted(above.keys() & below.keys()):
-        launches.setdefault(key[0], []).append(math.log(above[key] / below[key]))
-    return {launch: float(np.mean(logs)) for launch, logs in launches.items()}
+    return {launch: float(np.mean(np.log(ratios))) for launch, ratios in paired_by_launch(numerator, denominator).items()}
 
 
 def launch_medians(samples: Samples) -> np.ndarray:

@@ -11,7 +11,7 @@
 // specification what it cannot decide (tile_filtered-inl.h). At 1920x1080 on one thread filtered takes 1.06
 // to 1.09 times the time of fixed_8 for triangles of 2 to 450 pixels, most of it for orientations and
 // gradients in double and for bounds, and 1.01 to 1.03 times for large ones (AVX-512; 1.01 to 1.05 with
-// AVX2).
+// AVX2); measured before large triangles were drawn in blocks.
 //
 // Memory: the streams take 12 bytes for each fragment of a tiny triangle and 40 bytes for each tile that
 // another triangle's box touches, in blocks of 48 entries, of each worker and tile the last one partly empty;
