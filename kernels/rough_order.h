@@ -1,4 +1,4 @@
-// A rough order by depth, faster than sorting.
+// A rough order by depth, by counting: a sort within a class only where many fall into it.
 #pragma once
 
 #include <algorithm>
