@@ -16,6 +16,7 @@ from .statistics import Samples, is_number
 
 SCHEMA = 1
 LOOP_KEYS = ("busy_mean_ms", "busy_longest_ms", "imbalance_ms", "outside_ms")  # of raster_loop; absent in older records
+HELD_UP_KEYS = ("lock_wait_ms", "contended_locks", "failed_exchanges")  # likewise, and absent in some that have the others
 STAGES = ("clear", "geometry", "raster", "resolve")
 # What tables and plots of accuracy count; null where a mode has none.
 COUNTED = {"wrong", "exact_ties", "edge", "depth", "unexplained", "unbounded", "predicted", "wrong_on_snapped", "worst_distance_px",
@@ -87,6 +88,7 @@ class Record:
     context: str | None
     raw: dict[str, Any] = field(repr=False, default_factory=dict)
     floor_ms: float | None = None  # absent in older records
+    loop: np.ndarray | None = None  # the part of each raster stage in the loop under study, ms; absent in older records, and of peers
     origin: dict[str, Any] | None = None  # of merged studies: the node, its type, the job
 
     @property
@@ -346,7 +348,7 @@ class _Reader:
             raise self.fail("reason", f"missing, status is {status!r}")
         verify = self.verdicts(required=status == "ok")
         samples = self.samples() if status == "ok" else None
-        stages = self.stages(samples.n) if samples else {}
+        stages, loop = (self.stages(samples.n), self.loop(samples.n)) if samples else ({}, None)
         if status == "ok" and config.is_peer:
             # A peer has no specification to conform to: it must be within its bound of the truth.
             if (verify.get("end_to_end") or {}).get("errors") != 0:
@@ -367,7 +369,7 @@ class _Reader:
         return Record(self.line, identity, name, config, status, reason, samples, stages, value.get("stop"), verify,
                       self.mapping("work"), observed if is_number(observed) else None, tuple(per_thread),
                       float(median) if is_number(median) else None, tuple(recorded) if recorded else None,
-                      value.get("context"), value, self.floor(), self.origin())
+                      value.get("context"), value, self.floor(), loop if samples else None, self.origin())
 
     def origin(self) -> dict[str, Any] | None:
         origin = self.mapping("origin")
@@ -383,7 +385,8 @@ class _Reader:
 
     def raster_loop(self) -> None:
         loop = self.mapping("raster_loop")
-        for key in LOOP_KEYS if self.value.get("raster_loop") is not None else ():
+        known = [key for key in HELD_UP_KEYS if key in loop]
+        for key in [*LOOP_KEYS, *known] if self.value.get("raster_loop") is not None else ():
             if not (is_number(loop.get(key)) and loop[key] >= 0):
                 raise self.fail(f"raster_loop.{key}", f"expected a number that is not below 0, found {loop.get(key)!r}")
 
@@ -458,6 +461,14 @@ class _Reader:
                 raise self.fail(key, f"holds {len(place)} values for {len(values)} samples")
             places.append(place.astype(int))
         return Samples(values, *places)
+
+    def loop(self, n: int) -> np.ndarray | None:
+        if self.value.get("loop_ms") is None:
+            return None
+        values = self.numbers(self.value, "loop_ms")
+        if len(values) != n:
+            raise self.fail("loop_ms", f"holds {len(values)} values for {n} samples")
+        return values if len(values) and values.min() > 0 else None  # zeros: frames without stamps
 
     def stages(self, n: int) -> dict[str, np.ndarray]:
         source = self.mapping("stages_ms")

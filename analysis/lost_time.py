@@ -1,14 +1,15 @@
 """The lost-time identity: where the threads of a point were while they did not do the work of one.
 
-P T(P) - T(1) = work inflation + imbalance + dispatch + synchronisation + serial part + other stages + residual
+P T(P) - T(1) = work inflation + locks + imbalance + dispatch + synchronisation + serial part + other stages + residual
 
 T(1) is the serial backend's frame of the same kernel where the study has it, else the point's own on one thread. Of the raster stage each
 sample has a time R and the busy times of its threads (between the stamps of each loop), of which the longest, the mean b, longest - b and the
-time outside, o = R - longest, are taken within the sample; each term is made of medians of these over the samples (raster_loop.py). The
+time outside, o = R - longest, are taken within the sample, and so is the time w that the threads waited for locks; each term is made of medians of these over the samples (raster_loop.py). The
 base's are marked 1, the point's own on one thread s:
 
   dispatch          b_s - b_1               handing out chunks, on one thread; unknown without a serial point
-  work inflation    P b - b_s               the same work on P threads: caches, locks, atomics, contended hand-out
+  locks             w                       waiting for locks that others held, within the busy time; none on one thread
+  work inflation    P b - b_s - w           the same work on P threads: caches, atomics that had to be repeated, contended hand-out
   imbalance         P (longest - b)         waiting for the longest
   serial part       (P - 1) o_1             P - 1 threads have nothing to do outside of loops
   synchronisation   P (o - o_1)             starts, joins and barriers: time outside of loops beyond that of the base
@@ -34,7 +35,7 @@ from .raster_loop import RasterLoop
 from .tables import Table
 
 SECTION = "Lost time"
-TERMS = {"inflation": "work inflation", "imbalance": "imbalance", "dispatch": "dispatch", "synchronisation": "synchronisation",
+TERMS = {"inflation": "work inflation", "locks": "waiting for locks", "imbalance": "imbalance", "dispatch": "dispatch", "synchronisation": "synchronisation",
          "serial": "serial part", "others": "other stages", "residual": "residual"}
 RESIDUAL = "The residual is what medians leave, and frame time outside of stages; busy times that are wrong within their stage do not show in it:" \
            " what they miss is called synchronisation."
@@ -51,6 +52,7 @@ class LostTime:
     useful: float  # T(1)
     terms: dict[str, float | None]
     per_sample: bool  # else imbalance is that of the threads' medians, of an older record
+    failed_exchanges: float  # a frame, of all threads
 
     @property
     def lost(self) -> float:
@@ -91,7 +93,8 @@ def lost_time(analysis: Analysis, group: Group, record: Record) -> LostTime | No
     threads = record.config.threads
     medians = {r.id: float(np.median(r.samples.values)) for r in (record, base)}
     terms: dict[str, float | None] = {
-        "inflation": threads * own.mean - of_alone.mean,
+        "inflation": threads * own.mean - of_alone.mean - own.lock_wait,
+        "locks": own.lock_wait,
         "imbalance": threads * own.imbalance,
         "dispatch": of_alone.mean - of_base.mean if serial else None,
         "synchronisation": threads * (own.outside - of_base.outside),
@@ -99,7 +102,7 @@ def lost_time(analysis: Analysis, group: Group, record: Record) -> LostTime | No
         "others": sum(threads * stage(record, name) - stage(base, name) for name in STAGES if name != "raster")}
     total, useful = threads * medians[record.id], medians[base.id]
     terms["residual"] = total - useful - sum(term for term in terms.values() if term is not None)
-    return LostTime(record, base, total, useful, terms, own.per_sample)
+    return LostTime(record, base, total, useful, terms, own.per_sample, own.failed_exchanges)
 
 
 def lost_times(analysis: Analysis, group: Group) -> list[LostTime]:
@@ -115,17 +118,18 @@ def tables(analysis: Analysis) -> list[Table]:
                     "threads": one.record.config.threads}
             of = {"P T(P)": one.total, "T(1)": one.useful, "lost": one.lost} | {TERMS[name]: term for name, term in one.terms.items()}
             numbers.append(head | {"total_ms": one.total, "base_ms": one.useful, "lost_ms": one.lost}
-                           | {f"{name}_ms": term for name, term in one.terms.items()} | {"base": one.base.name, "per_sample": one.per_sample})
+                           | {f"{name}_ms": term for name, term in one.terms.items()} | {"failed_exchanges": one.failed_exchanges, "base": one.base.name, "per_sample": one.per_sample})
             words.append(head | {name: text.number(value) for name, value in of.items()}
-                         | {"base": "serial" if one.over_serial else "itself, 1 thread"})
+                         | {"failed exchanges": f"{one.failed_exchanges:.0f}", "base": "serial" if one.over_serial else "itself, 1 thread"})
     if not numbers:
         return []
     split = "" if all(one["base"] == "serial" for one in words) else \
         " Where the study has no serial point of the kernel, dispatch cannot be told from the work: it is missing and lies in both."
     return [Table("lost_time", "Lost time of each point",
                   "Milliseconds of thread time: P T(P) - T(1) and the terms that add up to it, of medians; analysis/lost_time.py has their"
-                  " formulas. Work inflation holds waiting for locks and atomics, and contended hand-out; a negative term is time that"
-                  f" several threads save. {RESIDUAL} Medians have no interval here: a term below the noise of the samples is none.{split}"
+                  " formulas. Waiting for locks is measured where a thread finds one taken; failed exchanges are compare-exchanges of a frame"
+                  " that found another thread's key, whose repetition is work inflation, as is contended hand-out; a negative term is time"
+                  f" that several threads save. {RESIDUAL} Medians have no interval here: a term below the noise of the samples is none.{split}"
                   f"{older_remark(older)}",
                   pd.DataFrame(numbers), pd.DataFrame(words), section=SECTION, folded=len(words) > 16)]
 

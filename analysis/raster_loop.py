@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .load import LOOP_KEYS, Record
+from .load import HELD_UP_KEYS, LOOP_KEYS, Record
 from .statistics import is_number
 
 REMARK = "of the threads' medians, in records of an older version: too even where the longest thread changes from frame to frame"
@@ -24,6 +24,9 @@ class RasterLoop:
     imbalance: float  # longest - mean
     outside: float | None  # stage - longest; None where an older record has no raster stage
     per_sample: bool
+    lock_wait: float = 0.0  # thread time, over the threads; in it they waited for locks
+    contended_locks: float = 0.0
+    failed_exchanges: float = 0.0
 
     @property
     def ratio(self) -> float:
@@ -48,4 +51,7 @@ def of(record: Record) -> RasterLoop | None:
         mean, longest = min(max(times), sum(times) / len(times)), max(times)  # no mean is above, but for rounding
         raster = record.stages.get("raster")
         return RasterLoop(mean, longest, longest - mean, None if raster is None else float(np.median(raster)) - longest, False)
-    return RasterLoop(*(float(said[key]) for key in LOOP_KEYS), per_sample=True) if said["busy_mean_ms"] > 0 else None
+    if said["busy_mean_ms"] <= 0:
+        return None
+    held_up = (float(said.get(key, 0)) for key in HELD_UP_KEYS)
+    return RasterLoop(*(float(said[key]) for key in LOOP_KEYS), True, *held_up)

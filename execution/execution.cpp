@@ -49,7 +49,16 @@ Execution::Execution(const ExecutionConfig& config)
       tally_(static_cast<std::size_t>(config.threads)),
       sightings_(static_cast<std::size_t>(config.threads)) {}
 
-void Execution::reset_tally() { std::fill(tally_.begin(), tally_.end(), WorkerTally{}); }
+void Execution::loop(std::int64_t n, LoopBody body) {
+  const double begin = stamped_ ? now() : 0;
+  run_loop(n, body);
+  if (stamped_) loop_seconds_ += now() - begin;
+}
+
+void Execution::reset_tally() {
+  std::fill(tally_.begin(), tally_.end(), WorkerTally{});
+  loop_seconds_ = 0;
+}
 
 void Execution::reset_sightings() {
   for (Sightings& sightings : sightings_) {

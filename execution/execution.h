@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/function_ref.h"
+#include "execution/contention.h"
 
 namespace rasterbench {
 
@@ -40,6 +41,16 @@ struct alignas(64) WorkerTally {
   std::int64_t chunks = 0;
   double busy_seconds = 0;  ///< between its first and last stamp in each loop
   int cpu = -1;             ///< where it ran last
+  Contention contention;
+
+  WorkerTally& operator+=(const WorkerTally& other) {
+    iterations += other.iterations;
+    chunks += other.chunks;
+    busy_seconds += other.busy_seconds;
+    contention += other.contention;
+    if (other.cpu >= 0) cpu = other.cpu;
+    return *this;
+  }
 };
 
 /// The CPUs on which one worker was seen, at the begin and the end of the loops since the last reset. Padded:
@@ -67,13 +78,17 @@ class Execution {
   int threads() const { return config_.threads; }
 
   /// The loop under study: iterations 0 .. n-1 under the configured schedule. Returns when all are done.
-  virtual void loop(std::int64_t n, LoopBody body) = 0;
+  void loop(std::int64_t n, LoopBody body);
 
   /// Loops that every strategy shares (clear, geometry, binning, resolve): the same backend and threads,
   /// dealt evenly, so that a schedule under study changes the loop under study only.
   virtual void uniform_loop(std::int64_t n, LoopBody body) = 0;
 
   std::span<const WorkerTally> tally() const { return tally_; }
+  /// Seconds that loop() took since the last reset, from its call to its return: with start and join.
+  double loop_seconds() const { return loop_seconds_; }
+  /// Where the body of a loop counts what held its worker up.
+  Contention& contention_of(int worker) { return tally_of(worker).contention; }
   void reset_tally();
 
   /// Where each worker was seen. Apart from the tally, which a frame resets before its raster stage: a sample
@@ -82,6 +97,8 @@ class Execution {
   void reset_sightings();
 
  protected:
+  virtual void run_loop(std::int64_t n, LoopBody body) = 0;
+
   /// Seconds of a monotonic clock.
   static double now();
   WorkerTally& tally_of(int worker) { return tally_[static_cast<std::size_t>(worker)]; }
@@ -94,6 +111,7 @@ class Execution {
   ExecutionConfig config_;
   bool stamped_;
   std::vector<WorkerTally> tally_;
+  double loop_seconds_ = 0;
   std::vector<Sightings> sightings_;
 };
 

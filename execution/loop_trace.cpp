@@ -16,7 +16,7 @@ class Traced final : public Execution {
     trace_.cut_at_multiples(has_chunks ? config().chunk.value_or(1) : 0);
   }
 
-  void loop(std::int64_t n, LoopBody body) override {
+  void run_loop(std::int64_t n, LoopBody body) override {
     inner_->reset_tally();
     if (config().schedule == "guided" && openmp_runtime() == "libgomp")
       trace_.cut_at(libgomp_guided_begins(n, threads(), config().chunk.value_or(1)));
@@ -41,14 +41,8 @@ class Traced final : public Execution {
 
  private:
   void add_tally() {
-    for (int worker = 0; worker < threads(); ++worker) {
-      const WorkerTally& from = inner_->tally()[static_cast<std::size_t>(worker)];
-      WorkerTally& to = tally_of(worker);
-      to.iterations += from.iterations;
-      to.chunks += from.chunks;
-      to.busy_seconds += from.busy_seconds;
-      if (from.cpu >= 0) to.cpu = from.cpu;
-    }
+    for (int worker = 0; worker < threads(); ++worker)
+      tally_of(worker) += inner_->tally()[static_cast<std::size_t>(worker)];
   }
 
   std::unique_ptr<Execution> inner_;

@@ -14,7 +14,7 @@ class OpenMp final : public Execution {
     omp_set_dynamic(0);  // never fewer threads than asked for without saying so
   }
 
-  void loop(std::int64_t n, LoopBody body) override { run(n, body, kind_, config().chunk.value_or(0)); }
+  void run_loop(std::int64_t n, LoopBody body) override { run(n, body, kind_, config().chunk.value_or(0)); }
   void uniform_loop(std::int64_t n, LoopBody body) override { run(n, body, omp_sched_static, 0); }
 
  private:

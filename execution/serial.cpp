@@ -8,7 +8,7 @@ class Serial final : public Execution {
  public:
   using Execution::Execution;
 
-  void loop(std::int64_t n, LoopBody body) override {
+  void run_loop(std::int64_t n, LoopBody body) override {
     const double begin = is_stamped() ? now() : 0;
     if (is_stamped()) sightings_of(0).look();
     for (std::int64_t i = 0; i < n; ++i) body(i, 0);
@@ -21,7 +21,7 @@ class Serial final : public Execution {
     tally.cpu = sightings_of(0).last;
   }
 
-  void uniform_loop(std::int64_t n, LoopBody body) override { loop(n, body); }
+  void uniform_loop(std::int64_t n, LoopBody body) override { run_loop(n, body); }
 };
 
 const ScheduleRegistration kSerial({.backend = "serial",

@@ -61,7 +61,7 @@ class Tbb final : public Execution {
         binder_(arena_, config.threads),
         stamps_(static_cast<std::size_t>(config.threads)) {}
 
-  void loop(std::int64_t n, LoopBody body) override {
+  void run_loop(std::int64_t n, LoopBody body) override {
     run(n, static_cast<std::size_t>(config().chunk.value_or(1)), body, partitioner_, config().trace);
   }
   void uniform_loop(std::int64_t n, LoopBody body) override {

@@ -119,6 +119,12 @@ void print_times(const Json& e) {
       "parts, barriers and starts {} ms\n",
       busy, number(loop.at("longest_over_mean"), 2), number(loop.at("imbalance_ms")),
       number(loop.at("serial_ms")));
+  if (loop.at("contended_locks") != 0.0)
+    fmt::print("locks: {} a frame were held by another thread, {} ms of thread time until they were free\n",
+               number(loop.at("contended_locks"), 0), number(loop.at("lock_wait_ms")));
+  if (loop.at("failed_exchanges") != 0.0)
+    fmt::print("atomics: {} compare-exchanges a frame found the key of another thread\n",
+               number(loop.at("failed_exchanges"), 0));
 }
 
 void print_counters(const Json& e) {

@@ -26,6 +26,8 @@ constexpr double kManySwitches = 2;    // a thread and frame
 /// The times of a point's frames in milliseconds, one a sample.
 struct Times {
   std::vector<double> frame, busy_mean, busy_longest, imbalance, serial;
+  std::vector<double> lock_wait, contended_locks,
+      failed_exchanges;                       // of all threads; the last two are counts
   std::array<std::vector<double>, 4> stages;  // empty: the kernel has no such stage
   std::vector<std::vector<double>> busy;      // by worker
 };
@@ -48,12 +50,17 @@ Times time_frames(const Point& point, const Scene& scene, int samples, Progress&
     for (std::size_t stage = 0; stage < seconds.size(); ++stage)
       if (seconds[stage]) times.stages[stage].push_back(1e3 * *seconds[stage]);
     double sum = 0, longest = 0;
+    Contention contention;
     for (std::size_t worker = 0; worker < report.raster_tally.size(); ++worker) {
       const double busy = 1e3 * report.raster_tally[worker].busy_seconds;
       times.busy[worker].push_back(busy);
       sum += busy;
       longest = std::max(longest, busy);
+      contention += report.raster_tally[worker].contention;
     }
+    times.lock_wait.push_back(1e3 * contention.lock_wait_seconds);
+    times.contended_locks.push_back(static_cast<double>(contention.contended_locks));
+    times.failed_exchanges.push_back(static_cast<double>(contention.failed_exchanges));
     const double mean = sum / point.execution.threads;
     times.busy_mean.push_back(mean);
     times.busy_longest.push_back(longest);
@@ -131,7 +138,10 @@ Json raster_loop_json(const Times& times) {
           {"busy_longest_ms", longest},
           {"longest_over_mean", mean > 0 ? Json(longest / mean) : Json()},
           {"imbalance_ms", median(times.imbalance)},
-          {"serial_ms", median(times.serial)}};
+          {"serial_ms", median(times.serial)},
+          {"lock_wait_ms", median(times.lock_wait)},
+          {"contended_locks", median(times.contended_locks)},
+          {"failed_exchanges", median(times.failed_exchanges)}};
 }
 
 /// Instructions per cycle, and misses per triangle and per sample inside one; null where one is unknown.

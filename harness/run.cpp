@@ -19,22 +19,25 @@ std::string text_or(const Json& object, const char* key) {
                                                             : std::string();
 }
 
-/// Median over samples of each worker's busy and idle time, with the last sample's counts.
+/// Median over samples of each worker's times and of what held it up, with the last sample's other counts.
 Json per_thread(const PointState& state) {
   Json threads = Json::array();
   if (state.samples.empty()) return threads;
   const Json& last = state.samples.back().answer.at("per_thread");
   for (std::size_t worker = 0; worker < last.size(); ++worker) {
-    const auto median_of = [&](const char* time) {
-      std::vector<double> ms;
+    const auto median_of = [&](const char* key) {
+      std::vector<double> values;
       for (const Sample& sample : state.samples)
-        ms.push_back(sample.answer.at("per_thread").at(worker).at(time));
-      return median(ms);
+        values.push_back(sample.answer.at("per_thread").at(worker).at(key));
+      return median(values);
     };
     threads.push_back({{"busy_ms", median_of("busy_ms")},
                        {"idle_ms", median_of("idle_ms")},
                        {"iterations", last.at(worker).at("iterations")},
                        {"chunks", last.at(worker).at("chunks")},
+                       {"failed_exchanges", median_of("failed_exchanges")},
+                       {"contended_locks", median_of("contended_locks")},
+                       {"lock_wait_ms", median_of("lock_wait_ms")},
                        {"cpu", last.at(worker).at("cpu")},
                        {"cpus", samples_by_cpu(state, worker)},
                        {"migrations", migrations_of(state, worker)}});
@@ -45,28 +48,35 @@ Json per_thread(const PointState& state) {
 /// How the raster stage was shared, within each sample and then as medians: the longest thread of a frame may
 /// be another one in the next. Null where no thread of a loop is known (peers).
 Json raster_loop(const PointState& state) {
-  std::vector<double> mean, longest, imbalance, outside;
+  std::vector<double> mean, longest, imbalance, outside, lock_wait, contended, failed;
   for (const Sample& sample : state.samples) {
     const Json& threads = sample.answer.at("per_thread");
     if (threads.empty()) return {};
     double sum = 0, most = 0, least_idle = std::numeric_limits<double>::infinity();
+    double waited = 0, locks = 0, exchanges = 0;
     for (const Json& thread : threads) {
       const double busy = thread.at("busy_ms");
       sum += busy;
       most = std::max(most, busy);
       least_idle = std::min(least_idle, thread.at("idle_ms").get<double>());
+      waited += thread.at("lock_wait_ms").get<double>();
+      locks += thread.at("contended_locks").get<double>();
+      exchanges += thread.at("failed_exchanges").get<double>();
     }
     mean.push_back(
         std::min(most, sum / static_cast<double>(threads.size())));  // no mean is above, but for rounding
     longest.push_back(most);
     imbalance.push_back(most - mean.back());
     outside.push_back(least_idle);
+    lock_wait.push_back(waited);
+    contended.push_back(locks);
+    failed.push_back(exchanges);
   }
   if (mean.empty()) return {};
-  return {{"busy_mean_ms", median(mean)},
-          {"busy_longest_ms", median(longest)},
-          {"imbalance_ms", median(imbalance)},
-          {"outside_ms", median(outside)}};
+  return {{"busy_mean_ms", median(mean)},      {"busy_longest_ms", median(longest)},
+          {"imbalance_ms", median(imbalance)}, {"outside_ms", median(outside)},
+          {"lock_wait_ms", median(lock_wait)}, {"contended_locks", median(contended)},
+          {"failed_exchanges", median(failed)}};
 }
 
 /// What decides how points are sampled; the time limit is not in it, so that --resume may give more time.
@@ -181,13 +191,15 @@ Json make_record(const PointState& state, const Study& study, std::optional<doub
                                                 : "the study's time limit left no time for a sample";
 
   // A point that failed shows no speed, even where it was timed before it did.
-  Json launches = Json::array(), blocks = Json::array(), stages;
+  Json launches = Json::array(), blocks = Json::array(), loops = Json::array(), stages;
   const std::vector<double> times = ok ? state.times_ms() : std::vector<double>{};
   for (const char* stage : {"clear", "geometry", "raster", "resolve"}) stages[stage] = Json::array();
   if (ok)
     for (const Sample& sample : state.samples) {
       launches.push_back(sample.launch);
       blocks.push_back(sample.block);
+      const Json& loop = sample.answer.at("loop_ms");
+      loop.is_null() ? (void)(loops = nullptr) : loops.push_back(loop);
       for (auto& [stage, values] : stages.items()) {
         const Json& part = sample.answer.at("stages").at(stage);
         part.is_null() ? (void)(values = nullptr) : values.push_back(part);  // an absent stage is so in all
@@ -198,6 +210,7 @@ Json make_record(const PointState& state, const Study& study, std::optional<doub
   record["frames_per_sample"] = state.frames;
   record["samples_ms"] = times;
   record["stages_ms"] = stages;
+  record["loop_ms"] = loops;
   const auto interval = median_interval(times);
   const auto p95 = percentile_95(times);
   record["median_ms"] = ok ? Json(median(times)) : Json();

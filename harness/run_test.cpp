@@ -33,15 +33,17 @@ class RunTest : public testing::Test {
               {"threads_observed", 1}}}};
   }
   Json sample(int block, double ms) {
-    const Json thread{{"busy_ms", ms / 2}, {"idle_ms", ms / 4}, {"iterations", 4}, {"chunks", 2},
-                      {"cpu", 0},          {"first_cpu", 0},    {"last_cpu", 0},   {"cpus", Json::array({0})},
-                      {"moves", 0}};
+    const Json thread{
+        {"busy_ms", ms / 2}, {"idle_ms", ms / 4},     {"iterations", 4},      {"chunks", 2},
+        {"cpu", 0},          {"first_cpu", 0},        {"last_cpu", 0},        {"cpus", Json::array({0})},
+        {"moves", 0},        {"failed_exchanges", 3}, {"contended_locks", 2}, {"lock_wait_ms", ms / 8}};
     return {{"event", "sample"},
             {"id", states_[0].id},
             {"block", block},
             {"launch", 0},
             {"answer",
              {{"ms", ms},
+              {"loop_ms", ms - 0.5},
               {"stages", {{"clear", 0.1}, {"geometry", 0.2}, {"raster", ms - 0.4}, {"resolve", 0.1}}},
               {"per_thread", Json::array({thread})},
               {"threads_observed", 1}}}};
@@ -64,9 +66,13 @@ TEST_F(RunTest, RecordHoldsTheSamples) {
   EXPECT_EQ(record.at("stop"), "target");
   EXPECT_EQ(record.at("frames_per_sample"), 2);
   EXPECT_EQ(record.at("stages_ms").at("geometry").size(), 7u);
+  EXPECT_EQ(record.at("loop_ms"), (Json{9.5, 8.5, 7.5, 6.5, 5.5, 4.5, 3.5}));
   EXPECT_EQ(record.at("per_thread").at(0).at("busy_ms"), 3.5);
   EXPECT_EQ(record.at("per_thread").at(0).at("idle_ms"), 1.75);
   EXPECT_EQ(record.at("per_thread").at(0).at("chunks"), 2);
+  EXPECT_EQ(record.at("per_thread").at(0).at("lock_wait_ms"), 0.875);
+  EXPECT_EQ(record.at("per_thread").at(0).at("contended_locks"), 2);
+  EXPECT_EQ(record.at("per_thread").at(0).at("failed_exchanges"), 3);
   EXPECT_EQ(record.at("per_thread").at(0).at("cpus"), (Json{{"0", 7}}));
   EXPECT_EQ(record.at("per_thread").at(0).at("migrations"), 0);
   EXPECT_EQ(record.at("placement").at("cpus"), 1);
@@ -89,9 +95,13 @@ TEST_F(RunTest, RasterLoopIsSharedWithinEachSample) {
   }
   const Json record = make_record(states_[0], study_, 1.5, Topology({}), "context");
   EXPECT_EQ(record.at("per_thread").at(0).at("busy_ms"), record.at("per_thread").at(1).at("busy_ms"));
-  EXPECT_EQ(
-      record.at("raster_loop"),
-      (Json{{"busy_mean_ms", 7.5}, {"busy_longest_ms", 10.0}, {"imbalance_ms", 2.5}, {"outside_ms", 1.0}}));
+  EXPECT_EQ(record.at("raster_loop"), (Json{{"busy_mean_ms", 7.5},
+                                            {"busy_longest_ms", 10.0},
+                                            {"imbalance_ms", 2.5},
+                                            {"outside_ms", 1.0},
+                                            {"lock_wait_ms", 3.0},
+                                            {"contended_locks", 4.0},
+                                            {"failed_exchanges", 6.0}}));
 }
 
 /// Three times 0.1 over three is more than 0.1.

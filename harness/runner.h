@@ -11,8 +11,8 @@ namespace rasterbench {
 
 /// Serves requests until stdin ends:
 ///   {"op": "verify", "point": {...}}                  -> Verifier::judge
-///   {"op": "sample", "point": {...}, "name", "frames"} -> {"ms", "stages", "per_thread", "threads_observed",
-///   "runtime_observed" (of OpenMP's points), "counters"}
+///   {"op": "sample", "point": {...}, "name", "frames"} -> {"ms", "stages", "loop_ms", "per_thread",
+///   "threads_observed", "runtime_observed" (of OpenMP's points), "counters"}
 ///   {"op": "peer"}                                    -> {"renderer", "version"} of this process's llvmpipe
 ///   {"op": "limit", "threads", "read_bytes", "write_bytes", "seconds"} -> measure_limit()
 ///   {"op": "explain", "point": {...}, "samples"}      -> explain_point()

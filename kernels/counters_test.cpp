@@ -1,6 +1,7 @@
 // Counted frames: the picture of the others, and counts that are those of a scene computed by hand.
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cmath>
 
 #include "kernels/kernel.h"
@@ -163,6 +164,50 @@ TEST(Counters, PictureAndCountsAreThoseOfOneThread) {
         EXPECT_GE(c.merges.value_or(0), serial.merges.value_or(0));
       }
     }
+  }
+}
+
+/// 4,000 triangles in front of each other, the nearest last, so that each fragment is kept when it comes:
+/// whatever two threads draw, they draw to the same pixels.
+Scene pile() {
+  Scene scene = scene_by_hand();
+  scene.model.triangles.clear();
+  for (int i = 0; i < 4000; ++i) scene.model.triangles.push_back(right_triangle(8, 8, 4.25, i / 8000.0));
+  return scene;
+}
+
+/// What a frame of the pile counted, of all threads.
+Contention contention_of(std::string_view kernel, const ExecutionConfig& execution) {
+  const Scene scene = pile();
+  const auto renderer = make_renderer(kernel, "f32", {&scene, small_settings(), execution});
+  Contention sum;
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  do {
+    for (const WorkerTally& worker : renderer->draw().raster_tally) sum += worker.contention;
+  } while (execution.threads > 1 && sum.failed_exchanges + sum.contended_locks == 0 &&
+           std::chrono::steady_clock::now() < end);
+  return sum;
+}
+
+TEST(Contention, OfTwoThreadsOnTheSamePixels) {
+  if (available_cpus() < 2) GTEST_SKIP() << "needs two CPUs";
+  const ExecutionConfig two{.backend = "openmp", .schedule = "dynamic", .chunk = 1, .threads = 2};
+  const Contention atomics = contention_of("triangle_atomics", two);
+  EXPECT_GT(atomics.failed_exchanges, 0);
+  EXPECT_EQ(atomics.contended_locks, 0);
+  EXPECT_EQ(atomics.lock_wait_seconds, 0);
+  const Contention locks = contention_of("triangle_locks", two);
+  EXPECT_GT(locks.contended_locks, 0);
+  EXPECT_GT(locks.lock_wait_seconds, 0);
+  EXPECT_LT(locks.lock_wait_seconds, 20);
+  EXPECT_EQ(locks.failed_exchanges, 0);
+}
+
+TEST(Contention, OneThreadIsInNobodysWay) {
+  for (const std::string_view kernel : {"triangle_atomics", "triangle_locks"}) {
+    const Contention alone = contention_of(kernel, {});
+    EXPECT_EQ(alone.failed_exchanges + alone.contended_locks, 0) << kernel;
+    EXPECT_EQ(alone.lock_wait_seconds, 0) << kernel;
   }
 }
 

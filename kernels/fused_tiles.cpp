@@ -8,10 +8,9 @@
 // & Karras, High-performance software rasterization on GPUs, 2011, the size classes.
 //
 // Modes: fixed_8 in integers, and filtered in float32 with error bounds, which leaves to the scalar
-// specification what it cannot decide (tile_filtered-inl.h). At 1920x1080 on one thread filtered takes 1.06
-// to 1.09 times the time of fixed_8 for triangles of 2 to 450 pixels, most of it for orientations and
-// gradients in double and for bounds, and 1.01 to 1.03 times for large ones (AVX-512; 1.01 to 1.05 with
-// AVX2); measured before large triangles were drawn in blocks.
+// specification what it cannot decide (tile_filtered-inl.h). At 1920x1080 on one thread filtered takes 1.05
+// to 1.10 times the time of fixed_8 for triangles of 2 to 450 pixels (1.07 to 1.12 with AVX2), most of it
+// for orientations and gradients in double and for bounds, and 1.01 times for large ones (1.03 with AVX2).
 //
 // Memory: the streams take 12 bytes for each fragment of a tiny triangle and 40 bytes for each tile that
 // another triangle's box touches, in blocks of 48 entries, of each worker and tile the last one partly empty;
@@ -90,7 +89,7 @@ class FusedTiles final : public Renderer {
 
   const FrameReport& draw() override {
     report_.seconds = {};
-    execution_->reset_tally();
+    report_.reset_tally();
     for (Batch& batch : batches_) batch = {};
     for (const auto& worker : workers_) worker->scratch.hidden_entries = 0;
     WorkCounters counters;
@@ -99,11 +98,12 @@ class FusedTiles final : public Renderer {
       StageSeconds seconds;
       seconds.geometry = seconds_of([&] { last_round = fill_streams(); });
       if (count_) count_streams(counters);
+      execution_->reset_tally();
       seconds.raster = seconds_of([&] { draw_tiles(first_round, last_round); });
+      report_.add_tally(*execution_);
       report_.seconds += seconds;
       first_round = false;
     }
-    report_.raster_tally.assign(execution_->tally().begin(), execution_->tally().end());
     report_.counts = std::accumulate(batches_.begin(), batches_.end(), GeometryCounts{},
                                      [](GeometryCounts sum, const Batch& b) { return sum += b.counts; });
     if (count_) {

@@ -69,7 +69,8 @@ class RayCast final : public Renderer {
     });
     execution_->reset_tally();
     report_.seconds.raster = seconds_of([&] { trace(); });
-    report_.raster_tally.assign(execution_->tally().begin(), execution_->tally().end());
+    report_.reset_tally();
+    report_.add_tally(*execution_);
     report_.seconds.resolve = seconds_of([&] {
       const std::int64_t width = settings_.width;
       execution_->uniform_loop(settings_.height, [&](std::int64_t y, int) {

@@ -12,11 +12,11 @@ namespace rasterbench {
 namespace {
 
 /// Lowers `pixel` to `key`. Relaxed: the loop's end orders all of it before resolve reads.
-void atomic_minimum(std::uint64_t& pixel, std::uint64_t key) {
+void atomic_minimum(std::uint64_t& pixel, std::uint64_t key, Contention& contention) {
   std::atomic_ref<std::uint64_t> shared(pixel);
   std::uint64_t seen = shared.load(std::memory_order_relaxed);
-  while (key < seen && !shared.compare_exchange_weak(seen, key, std::memory_order_relaxed)) {
-  }
+  while (key < seen && !shared.compare_exchange_weak(seen, key, std::memory_order_relaxed))
+    ++contention.failed_exchanges;
 }
 
 struct TriangleAtomics {
@@ -29,10 +29,12 @@ struct TriangleAtomics {
   class Strategy {
    public:
     void draw(const StagedTriangles<Mode>& in, Visibility<Mode> out, Execution& execution) {
-      execution.loop(in.size(), [&](std::int64_t i, int) {
+      execution.loop(in.size(), [&](std::int64_t i, int worker) {
         const auto triangle = in.prepare(i);
-        for_each_fragment<Mode>(triangle, triangle.box,
-                                [&](auto x, auto y, auto key) { atomic_minimum(out.at(x, y), key); });
+        Contention& contention = execution.contention_of(worker);
+        for_each_fragment<Mode>(triangle, triangle.box, [&](auto x, auto y, auto key) {
+          atomic_minimum(out.at(x, y), key, contention);
+        });
       });
     }
   };

@@ -22,12 +22,12 @@ struct TriangleLocks {
   class Strategy {
    public:
     void draw(const StagedTriangles<Mode>& in, Visibility<Mode> out, Execution& execution) {
-      execution.loop(in.size(), [&](std::int64_t i, int) {
+      execution.loop(in.size(), [&](std::int64_t i, int worker) {
         const auto triangle = in.prepare(i);
         for (std::int32_t y = triangle.box.y0; y < triangle.box.y1; ++y)
           for (std::int32_t x = triangle.box.x0; x < triangle.box.x1;) {
             const std::int32_t end = std::min(triangle.box.x1, (x / kSegment + 1) * kSegment);
-            draw_segment(triangle, x, end, y, out);
+            draw_segment(triangle, x, end, y, out, execution.contention_of(worker));
             x = end;
           }
       });
@@ -45,7 +45,7 @@ struct TriangleLocks {
     };
 
     void draw_segment(const typename Mode::Prepared& triangle, std::int32_t x0, std::int32_t x1,
-                      std::int32_t y, Visibility<Mode>& out) {
+                      std::int32_t y, Visibility<Mode>& out, Contention& contention) {
       std::array<Key, kSegment> found;
       std::int32_t first = x1, last = x0 - 1;
       for (std::int32_t x = x0; x < x1; ++x) {
@@ -60,7 +60,7 @@ struct TriangleLocks {
       const std::size_t segment =
           static_cast<std::size_t>(y) * static_cast<std::size_t>(out.width / kSegment + 1) +
           static_cast<std::size_t>(x0 / kSegment);
-      const std::lock_guard<std::mutex> guard(locks_[segment % kLocks].mutex);
+      const auto guard = lock_counted(locks_[segment % kLocks].mutex, contention);
       // Not every mode is monotone along rows: between the first and the last there may be holes, which are
       // clear and win nothing.
       for (std::int32_t x = first; x <= last; ++x) {

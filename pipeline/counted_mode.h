@@ -76,7 +76,7 @@ class CountingExecution final : public Execution {
   }
   ~CountingExecution() override { calls_of_this_thread = nullptr; }
 
-  void loop(std::int64_t n, LoopBody body) override {
+  void run_loop(std::int64_t n, LoopBody body) override {
     inner_.loop(n, [&](std::int64_t i, int worker) { run(i, worker, body); });
     calls_of_this_thread = calls_.data();
   }

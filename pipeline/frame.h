@@ -109,7 +109,20 @@ struct FrameReport {
   StageSeconds seconds;
   GeometryCounts counts;
   std::vector<WorkerTally> raster_tally;  ///< per worker, of the raster stage
+  double loop_seconds = 0;                ///< of the raster stage, in the loop under study
   WorkCounters counters;                  ///< of a renderer that counts; empty otherwise
+
+  void reset_tally() {
+    raster_tally.clear();
+    loop_seconds = 0;
+  }
+  /// Adds what `execution` has tallied since its last reset, which was the begin of a raster stage.
+  void add_tally(const Execution& execution) {
+    raster_tally.resize(execution.tally().size());
+    for (std::size_t worker = 0; worker < raster_tally.size(); ++worker)
+      raster_tally[worker] += execution.tally()[worker];
+    loop_seconds += execution.loop_seconds();
+  }
 };
 
 /// Draws frames of one point: one scene, kernel, numeric mode and execution. Owns every buffer of the point

@@ -156,7 +156,8 @@ class FrameRenderer final : public Renderer {
         strategy_.draw(staged(), visibility, *execution_);
       }
     });
-    report_.raster_tally.assign(execution_->tally().begin(), execution_->tally().end());
+    report_.reset_tally();
+    report_.add_tally(*execution_);
     // Without vectors there are no stores past the caches: a block of its own would be one more copy.
     const bool streaming = settings_.techniques.streaming && settings_.geometry.isa != Isa::kBaseline;
     report_.seconds.resolve = seconds_of([&] {

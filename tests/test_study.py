@@ -87,7 +87,7 @@ CONFIG = {"scene": TEXT, "scene_hash": TEXT, "size": LIST, "kernel": TEXT, "nume
           "schedule": (TEXT, NULL), "chunk": (WHOLE, NULL), "threads": WHOLE, "binding": TEXT, "wait_policy": TEXT, "runtime": TEXT,
           "tile": (WHOLE, NULL), "isa": TEXT, "output": TEXT, "cache": TEXT, "generality": TEXT, "techniques": (TEXT, NULL)}
 RECORD = {"schema": WHOLE, "id": TEXT, "name": TEXT, "config": dict, "status": TEXT, "launches": LIST, "blocks": LIST, "frames_per_sample": WHOLE,
-          "samples_ms": LIST, "stages_ms": dict, "median_ms": (*NUMBER, NULL), "interval_ms": (LIST, NULL), "p95_ms": (*NUMBER, NULL),
+          "samples_ms": LIST, "stages_ms": dict, "loop_ms": (LIST, NULL), "median_ms": (*NUMBER, NULL), "interval_ms": (LIST, NULL), "p95_ms": (*NUMBER, NULL),
           "min_ms": (*NUMBER, NULL), "max_ms": (*NUMBER, NULL), "floor_ms": (*NUMBER, NULL), "stop": (TEXT, NULL), "verify": (dict, NULL), "work": (dict, NULL), "hardware": (dict, NULL),
           "threads_observed": (WHOLE, NULL), "runtime_observed": (TEXT, NULL), "per_thread": LIST, "raster_loop": (dict, NULL), "placement": (dict, NULL), "context": TEXT}
 PLACEMENT = {"binding": (TEXT, NULL)} | dict.fromkeys(["migrations", "cpus", "cores", "packages", "numa_nodes", "samples_sharing_cpu", "samples_sharing_core"], WHOLE)
@@ -218,7 +218,8 @@ def test_statistics_are_those_of_the_samples(study: Study) -> None:
         assert r["interval_ms"] == interval(times)
         assert (r["min_ms"], r["max_ms"]) == (min(times), max(times))
         assert r["p95_ms"] == (sorted(times)[-(-95 * len(times) // 100) - 1] if len(times) >= 59 else None)
-        for i, total in enumerate(times):  # stages are parts of a sample
+        for i, total in enumerate(times):  # the loop is a part of its stage, and stages are parts of a sample
+            assert 0 < r["loop_ms"][i] <= r["stages_ms"]["raster"][i] * 1.0001
             assert sum(r["stages_ms"][s][i] for s in STAGES if r["stages_ms"][s] is not None) <= total * 1.0001
 
 
@@ -245,11 +246,13 @@ def test_good_points_are_verified(study: Study) -> None:
         assert 0 < w["drawn"] <= w["triangles"] and w["fragments_tested"] >= w["fragments_covered"] >= w["covered_pixels"] > 100 and w["bytes"] > 0
         assert w["drawn"] + sum(w["rejected"].values()) == w["triangles"]
         assert r["threads_observed"] == r["config"]["threads"] == len(r["per_thread"])
-        assert set(r["raster_loop"]) == {"busy_mean_ms", "busy_longest_ms", "imbalance_ms", "outside_ms"} and min(r["raster_loop"].values()) >= 0
+        assert set(r["raster_loop"]) == {"busy_mean_ms", "busy_longest_ms", "imbalance_ms", "outside_ms", "lock_wait_ms", "contended_locks",
+                                         "failed_exchanges"} and min(r["raster_loop"].values()) >= 0
         assert r["raster_loop"]["busy_longest_ms"] >= r["raster_loop"]["busy_mean_ms"]
         for worker in r["per_thread"]:
-            assert set(worker) == {"busy_ms", "idle_ms", "iterations", "chunks", "cpu", "cpus", "migrations"}
-            assert min(worker["busy_ms"], worker["idle_ms"]) >= 0 and 0 <= worker["chunks"] <= worker["iterations"]
+            assert set(worker) == {"busy_ms", "idle_ms", "iterations", "chunks", "failed_exchanges", "contended_locks", "lock_wait_ms", "cpu", "cpus",
+                                   "migrations"}
+            assert 0 <= worker["lock_wait_ms"] <= worker["busy_ms"] and worker["idle_ms"] >= 0 and 0 <= worker["chunks"] <= worker["iterations"]
 
 
 def test_context_has_the_documented_keys(study: Study) -> None:

@@ -12,7 +12,7 @@ from ..lost_time import TERMS, LostTime
 from .common import Block, Drawing, Row, drawn_together, named, pages, part, row_frame
 
 MOST = 30  # rows; with more, only the fastest execution of each kernel and backend
-LOOKS = {"useful": ("#D9D9D9", ""), "inflation": (style.COLOURS[1], ""), "imbalance": (style.COLOURS[0], "----"), "dispatch": (style.COLOURS[4], "////"),
+LOOKS = {"useful": ("#D9D9D9", ""), "inflation": (style.COLOURS[1], ""), "locks": ("#F0E442", "oooo"), "imbalance": (style.COLOURS[0], "----"), "dispatch": (style.COLOURS[4], "////"),
          "synchronisation": (style.COLOURS[2], "...."), "serial": (style.COLOURS[3], "xxxx"), "others": (style.COLOURS[5], "\\\\\\\\"),
          "residual": ("#FFFFFF", "++++")}
 NAMES = {"useful": "T(1): the work of one thread"} | TERMS
@@ -75,7 +75,7 @@ def _draw(analysis: Analysis, group: Group) -> Iterator[Drawing]:
                  " point's own on one thread, and then dispatch is not told from the work.",
                  f"Bars are of medians ({analysis.sampled([one.record for one in on_page])} samples), without intervals; the largest residual is"
                  f" {100 * lost_time.worst_residual(on_page):.1f} % of P T(P).",
-                 "Work inflation holds waiting for locks and atomics, and contended hand-out; terms below 0 save time and stand left of it.",
+                 "Work inflation holds repeated atomics and contended hand-out; terms below 0 save time and stand left of it.",
                  lost_time.RESIDUAL + lost_time.older_remark(sum(not one.per_sample for one in on_page))]
         if not complete:
             notes.append("Of each kernel and backend only the fastest execution is drawn; tables/lost_time.csv has all.")

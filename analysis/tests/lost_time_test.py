@@ -11,7 +11,7 @@ import pytest
 from .. import lost_time, report
 from ..figures import balance
 from ..figures.lost_time import draw, shares
-from ..load import InputError
+from ..load import HELD_UP_KEYS, InputError
 from .conftest import analyse
 from .synthetic import loop_of, plan, write
 
@@ -52,7 +52,27 @@ def test_terms_of_known_times(study: MakeStudy) -> None:
     set_times(directory, known)
     one = found(directory)
     assert one.over_serial and (one.total, one.useful, one.lost) == (38, 24, 14)
-    assert one.terms == pytest.approx({"inflation": 2, "imbalance": 3, "dispatch": 1, "synchronisation": 2, "serial": 2, "others": 4, "residual": 0})
+    assert one.terms == pytest.approx({"inflation": 2, "locks": 0, "imbalance": 3, "dispatch": 1, "synchronisation": 2, "serial": 2, "others": 4, "residual": 0})
+
+
+def test_waiting_for_locks_is_not_work_inflation(study: MakeStudy) -> None:
+    directory = study(kernels=["tile_parallel"])
+    set_times(directory, known)
+    edit(directory, lambda value: (value["raster_loop"] or {}).update(lock_wait_ms=1.5 * (value["config"]["threads"] - 1), failed_exchanges=7.0))
+    one = found(directory)
+    assert (one.terms["locks"], one.terms["inflation"], one.terms["residual"], one.failed_exchanges) == (1.5, 0.5, 0, 7)
+    numbers = lost_time.tables(analyse(directory))[0].numbers
+    assert set(numbers["locks_ms"]) == {1.5} and set(numbers["failed_exchanges"]) == {7}
+
+
+def test_records_from_before_contention_was_counted(study: MakeStudy) -> None:
+    directory = study(kernels=["tile_parallel"])
+    set_times(directory, known)
+    edit(directory, lambda value: [(value["raster_loop"] or {}).pop(key, None) for key in HELD_UP_KEYS])
+    assert found(directory).terms["locks"] == 0
+    edit(directory, lambda value: (value["raster_loop"] or {}).update(lock_wait_ms=-1))
+    with pytest.raises(InputError, match="records.jsonl:1.*raster_loop.lock_wait_ms"):
+        analyse(directory)
 
 
 def test_without_a_serial_point_dispatch_is_unknown(study: MakeStudy) -> None:

@@ -93,7 +93,8 @@ def record(p: Plan, config: dict[str, Any], rng: np.random.Generator, drift: np.
         "schema": 1, "id": digest(config), "name": name(config), "config": config, "status": "ok",
         "launches": np.repeat(np.arange(p.launches), p.blocks).tolist(),
         "blocks": np.tile(np.arange(p.blocks), p.launches).tolist(), "frames_per_sample": 1,
-        "samples_ms": samples.tolist(), "stages_ms": stages, "median_ms": float(np.median(samples)),
+        "samples_ms": samples.tolist(), "stages_ms": stages,
+        "loop_ms": (samples * 0.7).round(6).tolist(), "median_ms": float(np.median(samples)),
         "interval_ms": list(bounds) if bounds else None, "p95_ms": float(np.quantile(samples, 0.95)) if n >= 59 else None,
         "min_ms": float(samples.min()), "max_ms": float(samples.max()), "stop": "target",
         "verify": {"conforms": True, "checked_against": "scalar specification", "differing_pixels": 0,
@@ -113,7 +114,7 @@ def loop_of(busy: list[float], raster: np.ndarray | float) -> dict[str, float]:
     """raster_loop of samples that all have these busy times."""
     longest, mean = max(busy), min(max(busy), sum(busy) / len(busy))
     return {"busy_mean_ms": mean, "busy_longest_ms": longest, "imbalance_ms": longest - mean,
-            "outside_ms": max(0.0, float(np.median(raster)) - longest)}
+            "outside_ms": max(0.0, float(np.median(raster)) - longest), "lock_wait_ms": 0.0, "contended_locks": 0.0, "failed_exchanges": 0.0}
 
 
 def statistics_stages() -> tuple[str, ...]:
