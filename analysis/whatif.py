@@ -126,7 +126,7 @@ class Model:
 
 @dataclass(frozen=True)
 class Measured:
-    """A point of a study beside its prediction: the raster stage, in which the loop is."""
+    """A point of a study beside its prediction: the loop, or where older records do not tell it the raster stage that it is in."""
 
     record: Record
     prediction: Prediction
@@ -151,6 +151,7 @@ class Comparison:
     scene: str
     points: list[Measured]
     left_out: int  # timed points of this loop whose schedule has no model
+    of_loop: bool  # else the raster stage is compared, of a study some of whose records do not tell the loop's part of it
     fits: dict[str, list[Fit]] = field(default_factory=dict)  # by rule and chunk
 
 
@@ -175,16 +176,17 @@ def measured(model: Model, directory: Path, scene: str | None) -> Comparison:
     scenes = sorted({r.config.scene for r in mine})
     if len(scenes) > 1:
         raise InputError(directory / "records.jsonl", f"holds {', '.join(scenes)}: name one with --scene", None, "config.scene")
+    of_loop = all(r.loop is not None for r in mine)
     points, left_out = [], 0
     for record in mine:
-        rule, stage = _rule(record), _stage(record)
-        if rule is None or stage is None:
+        rule, loop = _rule(record), _loop(record, of_loop)
+        if rule is None or loop is None:
             left_out += 1
             continue
         chunk = record.config.chunk if record.config.chunk is not None or rule.schedule == "static" else 1
-        base = _one_thread([r for r in mine if all(getattr(r.config, axis) == getattr(record.config, axis) for axis in CONDITIONS)])
-        points.append(Measured(record, model.predict(rule, chunk, record.config.threads), statistics.median_estimate(stage),
-                               None if base is None else statistics.ratio(base, stage)))
+        base = _one_thread([r for r in mine if all(getattr(r.config, axis) == getattr(record.config, axis) for axis in CONDITIONS)], of_loop)
+        points.append(Measured(record, model.predict(rule, chunk, record.config.threads), statistics.median_estimate(loop),
+                               None if base is None else statistics.ratio(base, loop)))
     # The runtime of a backend is its own: only where one backend has several does it tell points apart.
     varied = [axis for axis in SERIES if any(len({getattr(p.record.config, axis) for p in points if p.record.config.backend == backend}) > 1
                                              for backend in {p.record.config.backend for p in points})]
@@ -194,19 +196,19 @@ def measured(model: Model, directory: Path, scene: str | None) -> Comparison:
         series.setdefault(point.name, []).append(point)
     fits = {name: [scaling_laws.fit(law, [p.prediction.threads for p in of], [p.time.value for p in of]) for law in scaling_laws.LAWS]
             for name, of in series.items()}
-    return Comparison(study, Analysis(study).machine, scenes[0], points, left_out, fits)
+    return Comparison(study, Analysis(study).machine, scenes[0], points, left_out, of_loop, fits)
 
 
-def _stage(record: Record) -> Samples | None:
-    raster = record.stages.get("raster")
-    return None if raster is None else Samples(raster, record.samples.launches, record.samples.blocks)
+def _loop(record: Record, of_loop: bool) -> Samples | None:
+    times = record.loop if of_loop else record.stages.get("raster")
+    return None if times is None else Samples(times, record.samples.launches, record.samples.blocks)
 
 
-def _one_thread(records: Sequence[Record]) -> Samples | None:
-    """The raster stage on one thread: serial if it was measured, else the fastest schedule there."""
-    stages = [(r.config.backend != "serial", float(np.median(s.values)), i, s) for i, r in enumerate(records)
-              if r.config.threads == 1 and (s := _stage(r)) is not None]
-    return min(stages)[3] if stages else None
+def _one_thread(records: Sequence[Record], of_loop: bool) -> Samples | None:
+    """The loop on one thread: serial if it was measured, else the fastest schedule there."""
+    found = [(r.config.backend != "serial", float(np.median(s.values)), i, s) for i, r in enumerate(records)
+             if r.config.threads == 1 and (s := _loop(r, of_loop)) is not None]
+    return min(found)[3] if found else None
 
 
 def _rule(record: Record) -> Rule | None:
@@ -264,7 +266,8 @@ def measured_table(found: Comparison) -> Table:
                       "measured ms": text.estimate(p.time.value, p.time.low, p.time.high), "error": f"{100 * p.error:+.1f} %",
                       "predicted speedup": text.number(p.prediction.speedup),
                       "measured speedup": text.MISSING if s is None else text.estimate(s.value, s.low, s.high)})
-    return Table("whatif_measured", "Predicted and measured", f"The raster stage, which has more in it than the loop. {CAVEAT}; an error below 0:"
+    what = "The loop" if found.of_loop else "The raster stage, which has more in it than the loop"
+    return Table("whatif_measured", "Predicted and measured", f"{what}. {CAVEAT}; an error below 0:"
                  " measured longer than predicted.", pd.DataFrame(numbers), pd.DataFrame(words))
 
 
@@ -297,7 +300,8 @@ def findings(model: Model, found: Comparison | None) -> list[str]:
     if found is not None and found.points:
         for threads in sorted({p.prediction.threads for p in found.points}):
             errors = [p.error for p in found.points if p.prediction.threads == threads]
-            lines.append(f"Predicted against measured raster stage, {text.count(threads, 'thread')}: error {100 * np.median(errors):+.1f} %"
+            what = "loop" if found.of_loop else "raster stage (the records do not tell the loop)"
+            lines.append(f"Predicted against measured {what}, {text.count(threads, 'thread')}: error {100 * np.median(errors):+.1f} %"
                          f" (median of {text.count(len(errors), 'point')}; {100 * min(errors):+.1f} % to {100 * max(errors):+.1f} %).")
         if found.left_out:
             lines.append(f"{text.count(found.left_out, 'measured point')} of schedules without a model: left out (serial, auto, affinity).")

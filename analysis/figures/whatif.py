@@ -96,7 +96,8 @@ def _curves_caption(model: Model, found: Comparison | None, points: dict[Rule, l
         shown = [m for of in points.values() for m in of]
         counts = text.span([m.time.n for m in shown])
         kinds = text.listing(sorted({m.speedup.kind for m in shown if m.speedup.has_interval}))
-        sentences.append("Large symbols are measured: the median speedup of the whole raster stage of the fastest measured chunk over the same kernel on"
+        what = "loop" if found.of_loop else "whole raster stage"
+        sentences.append(f"Large symbols are measured: the median speedup of the {what} with the fastest measured chunk over the same kernel on"
                          f" one thread ({counts}; {f'95 % intervals, {kinds}' if kinds else 'no intervals: too few samples'}). Machine: {found.machine}.")
     else:
         sentences.append("Nothing was measured." + (f" Costs of {costs.machine}." if costs.machine else ""))

@@ -167,7 +167,7 @@ def test_points_under_other_conditions_are_series_of_their_own(tmp_path):
         for entry in [json.loads(json.dumps(entry)) for entry in records]:
             entry["config"]["cache"] = "cold"
             entry |= {"id": synthetic.digest(entry["config"]), "name": entry["name"] + "/cold", "samples_ms": [3 * t for t in entry["samples_ms"]]}
-            entry["stages_ms"] = {key: v and [3 * t for t in v] for key, v in entry["stages_ms"].items()}
+            entry["loop_ms"] = [3 * t for t in entry["loop_ms"]]
             records.append(entry)
 
     m = model(tmp_path, loops.heavy(100))
@@ -176,6 +176,23 @@ def test_points_under_other_conditions_are_series_of_their_own(tmp_path):
     assert {"openmp dynamic,1, cache warm", "openmp dynamic,1, cache cold"} <= set(found.fits)
     warm, cool = ({(p.prediction.name, p.prediction.threads): p.speedup.value for p in found.points if p.record.config.cache == c} for c in ("warm", "cold"))
     assert warm and warm == pytest.approx(cool)  # each over one thread of its own
+
+
+def test_the_loop_is_compared_and_the_stage_where_a_record_does_not_tell_it(tmp_path):
+    def older(records):
+        today(records)
+        records[-1].pop("loop_ms")
+
+    def stampless(records):
+        today(records)
+        records[-1]["loop_ms"] = [0.0] * len(records[-1]["loop_ms"])
+
+    m = model(tmp_path, loops.heavy(100))
+    new, *old = (whatif.measured(m, synthetic.write(tmp_path / edit.__name__, plan(edit=edit, threads=[1, 2])), None) for edit in (today, older, stampless))
+    assert new.of_loop and "measured loop, 2 threads" in "\n".join(whatif.findings(m, new)) and whatif.measured_table(new).note.startswith("The loop.")
+    for study in old:
+        assert not study.of_loop and "do not tell the loop" in "\n".join(whatif.findings(m, study))
+        assert [p.time.value / 0.76 for p in study.points] == pytest.approx([p.time.value / 0.7 for p in new.points], rel=1e-4)
 
 
 def test_an_unmeasured_overhead_is_said(tmp_path):
