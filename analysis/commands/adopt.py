@@ -7,7 +7,7 @@ from pathlib import Path
 
 NAME = "adopt"
 HELP = "draw speedup, efficiency and schedules of a program that rasterbench adopt has timed"
-DESCRIPTION = ("Writes DIR/figures/*.svg, *.pdf, *.png with their captions, .txt, and DIR/tables/*.csv, *.tex, then prints the times with 95 %%"
+DESCRIPTION = ("Writes DIR/figures/*.svg, *.pdf, *.png with their captions, .txt, and DIR/tables/*.csv, *.tex, then prints the times with 95 %"
                " intervals.")
 
 

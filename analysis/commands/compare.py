@@ -10,7 +10,7 @@ from . import studies
 NAME = "compare"
 HELP = "compare two runs, point by point"
 DESCRIPTION = ("Says of each point whether B is FASTER or SLOWER than A, the SAME within the margin, or AMBIGUOUS, with the ratio of their times"
-               " and its 95 %% interval. Exit codes: 0 nothing is slower, 1 a point is slower, 2 bad input, or the recorded contexts differ"
+               " and its 95 % interval. Exit codes: 0 nothing is slower, 1 a point is slower, 2 bad input, or the recorded contexts differ"
                " (one line a difference), 3 a point was lost, 4 undecided: no point, or fewer than half of the points, could be called"
                " FASTER, SLOWER or SAME.")
 

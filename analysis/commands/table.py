@@ -8,7 +8,7 @@ from . import studies
 
 NAME = "table"
 HELP = "print the table of strategies and executions"
-DESCRIPTION = "Prints for each scene every point with its median time in milliseconds and the 95 %% interval."
+DESCRIPTION = "Prints for each scene every point with its median time in milliseconds and the 95 % interval."
 
 arguments = studies.directory
 
