@@ -15,9 +15,13 @@ import matplotlib
 import numpy as np
 import pandas as pd
 
-from . import load, sidecars, statistics, style, text, writing
+from . import load, sidecars, style, text, writing
 from .load import InputError
-from .statistics import Comparison, Estimate, Samples, is_number
+from .statistics import estimates
+from .statistics.estimates import Estimate
+from .statistics.fastest import Comparison, compare_with_best
+from .statistics.numbers import is_number
+from .statistics.samples import Samples
 from .tables import VERDICTS, Table, columns, times
 
 AS_COMPILED = "as compiled"  # the program does not ask for OMP_SCHEDULE
@@ -85,12 +89,12 @@ class Adoption:
         base = self.base(point.schedule)
         if base is point:
             return Estimate(1.0, None, None, point.samples.n, "base")
-        return statistics.ratio(base.samples, point.samples)
+        return estimates.ratio(base.samples, point.samples)
 
     @cached_property
     def comparisons(self) -> list[Comparison]:
         """Every point against the fastest, in the order of the points."""
-        return statistics.compare_with_best([point.samples for point in self.points])[1]
+        return compare_with_best([point.samples for point in self.points])[1]
 
 
 def read(directory: Path) -> Adoption:
@@ -151,8 +155,8 @@ def table(adoption: Adoption) -> Table:
     numbers, words = [], []
     has_own = any(point.own for point in adoption.points)
     for point, comparison in zip(adoption.points, adoption.comparisons):
-        time, speedup = statistics.median_estimate(point.samples), adoption.speedup(point)
-        efficiency = statistics.efficiency(speedup, point.threads)
+        time, speedup = estimates.median_estimate(point.samples), adoption.speedup(point)
+        efficiency = estimates.efficiency(speedup, point.threads)
         values = point.samples.values
         p95 = float(np.sort(values)[int(np.ceil(0.95 * len(values))) - 1]) if len(values) >= 59 else None
         own = float(np.median(point.own)) if point.own else None

@@ -6,13 +6,14 @@ import math
 from dataclasses import dataclass
 from typing import Any, Iterator
 
-from . import nodes, severity, statistics, text, weak
+from . import nodes, severity, text, weak
 from .comparison import Analysis
 from .contexts import leaves
 from .load import Record, Study
 from .raster_loop import busy
 from .severity import GRAVE, NOTE
-from .statistics import is_close
+from .statistics import intervals, rank_tests
+from .statistics.numbers import is_close
 from .steadiness import placement
 
 NOT_PUBLISHABLE = "not publishable"  # what the report calls a grave one
@@ -58,17 +59,17 @@ def _some(records: list[Record], analysis: Analysis) -> str:
 
 def _launches(analysis: Analysis) -> Iterator[Warn]:
     counts = {record.samples.launch_count for record in analysis.study.timed}
-    if counts and min(counts) < statistics.MIN_LAUNCHES:
+    if counts and min(counts) < intervals.MIN_LAUNCHES:
         many = "one launch" if max(counts) == 1 else text.count(min(counts), "launch", "launches")
         many += " for some points" if len(counts) > 1 else ""
-        yield Warn(severity.FEW_LAUNCHES, f"{many}: published results need at least {statistics.MIN_LAUNCHES}, because one process has one"
+        yield Warn(severity.FEW_LAUNCHES, f"{many}: published results need at least {intervals.MIN_LAUNCHES}, because one process has one"
                    " memory layout; the intervals here do not cover what another launch would change.")
 
 
 def _samples(analysis: Analysis) -> Iterator[Warn]:
-    few = [r for r in analysis.study.timed if r.samples.n < statistics.MIN_SAMPLES]
+    few = [r for r in analysis.study.timed if r.samples.n < intervals.MIN_SAMPLES]
     if few:
-        yield Warn(severity.FEW_SAMPLES, f"fewer than {statistics.MIN_SAMPLES} samples for {_some(few, analysis)}: they have no interval and"
+        yield Warn(severity.FEW_SAMPLES, f"fewer than {intervals.MIN_SAMPLES} samples for {_some(few, analysis)}: they have no interval and"
                    " nothing is claimed of them.")
 
 
@@ -254,7 +255,7 @@ def _floors(analysis: Analysis) -> Iterator[Warn]:
 
 def _families(analysis: Analysis) -> Iterator[Warn]:
     """Many comparisons with few samples: no rank test can be significant after the correction, whatever the times."""
-    assumed = [c for group in analysis.groups for c in group.comparisons.values() if c.test == statistics.WELCH]
+    assumed = [c for group in analysis.groups for c in group.comparisons.values() if c.test == rank_tests.WELCH]
     if assumed:
         most = max(len(group.timed) - 1 for group in analysis.groups)
         yield Warn(severity.ASSUMED_TEST, f"too few samples for a rank test among up to {text.count(most, 'comparison')}: {len(assumed)} comparisons with the"
@@ -282,7 +283,7 @@ def _agreement(analysis: Analysis) -> Iterator[Warn]:
                    " shown as failed.")
     off = []
     for record in study.timed:
-        bounds = statistics.order_interval(record.samples.values)
+        bounds = intervals.order_interval(record.samples.values)
         stored = record.recorded_interval
         if (bounds is None) != (stored is None) or (bounds and not all(map(is_close, bounds, stored))) or (
                 record.recorded_median is not None and not is_close(record.recorded_median, analysis.estimates[record.id].value)):

@@ -3,7 +3,7 @@
 Every verdict needs evidence. FASTER and SLOWER: an interval of the ratio that excludes 1, and a difference of the samples
 and of the launches of both runs after Holm's correction over all points that can be judged. SAME: an interval within the
 margin, where a difference may exist and is too small to care. Everything else is AMBIGUOUS, which does not mean "no
-difference". Two runs are not interleaved: repeats of A, if there are any, widen the intervals (statistics.yardstick).
+difference". Two runs are not interleaved: repeats of A, if there are any, widen the intervals (statistics/runs.py).
 """
 
 from __future__ import annotations
@@ -15,9 +15,12 @@ from typing import Any, Sequence
 import numpy as np
 from scipy import stats
 
-from . import contexts, google_benchmark, statistics, text
+from . import contexts, google_benchmark, text
 from .load import InputError, Record, load
-from .statistics import Estimate, Samples
+from .statistics import intervals, rank_tests
+from .statistics.estimates import Estimate
+from .statistics.runs import between_runs, widened_by, yardstick
+from .statistics.samples import Samples
 
 FASTER, SLOWER, SAME, AMBIGUOUS, LOST = "FASTER", "SLOWER", "SAME", "AMBIGUOUS", "LOST"
 # The program chooses it from the time of the first frames, so two runs of one program may differ in it: said, not refused.
@@ -142,9 +145,9 @@ def compare(a: Run, b: Run, ignore: Sequence[str] = (), margin: float | None = N
         raise InputError(repeats[0].path, "no point is in all repeats of A, in A and in B")
     margin = margin if margin is not None else max(a.target or 0.0, b.target or 0.0) or 0.02
     able = [name for name in common if _unable(a.samples[name], b.samples[name], few_launches) is None]
-    tested = {name: statistics.between_runs(b.samples[name], a.samples[name], max(1, len(able))) for name in common}
+    tested = {name: between_runs(b.samples[name], a.samples[name], max(1, len(able))) for name in common}
     # Counts alone decide what can be judged, so leaving the others out of the family selects nothing.
-    corrected = dict(zip(able, statistics.holm([tested[name][1] for name in able])))
+    corrected = dict(zip(able, rank_tests.holm([tested[name][1] for name in able])))
     distances = _distances(common, [a, *repeats])
     rows = [_row(name, a.samples[name], b.samples[name], tested[name], corrected.get(name), distances[name], margin, few_launches)
             for name in common]
@@ -179,34 +182,34 @@ def _distances(names: Sequence[str], runs: Sequence[Run]) -> dict[str, float]:
     if len(runs) < 2:
         return dict.fromkeys(names, 0.0)
     logs = np.array([[np.log(np.median(run.samples[name].values)) if name in run.samples else np.nan for run in runs] for name in names])
-    return dict(zip(names, statistics.yardstick(logs).tolist()))
+    return dict(zip(names, yardstick(logs).tolist()))
 
 
 def _unable(a: Samples, b: Samples, few_launches: bool) -> str | None:
     """Why the counts of a point allow no verdict."""
-    if min(a.n, b.n) < statistics.MIN_SAMPLES:
-        return f"fewer than {statistics.MIN_SAMPLES} samples"
-    if min(a.launch_count, b.launch_count) < statistics.MIN_LAUNCHES and not few_launches:
-        return f"fewer than {statistics.MIN_LAUNCHES} launches on a side: others may differ by as much (--few-launches judges them)"
+    if min(a.n, b.n) < intervals.MIN_SAMPLES:
+        return f"fewer than {intervals.MIN_SAMPLES} samples"
+    if min(a.launch_count, b.launch_count) < intervals.MIN_LAUNCHES and not few_launches:
+        return f"fewer than {intervals.MIN_LAUNCHES} launches on a side: others may differ by as much (--few-launches judges them)"
     return None
 
 
 def _row(name: str, a: Samples, b: Samples, tested: tuple[Estimate, float, str], p: float | None, distance: float, margin: float,
          few_launches: bool) -> Row:
     """p: after Holm; None where the counts allow no verdict."""
-    ratio = statistics.widened_by(tested[0], distance) if distance else tested[0]
+    ratio = widened_by(tested[0], distance) if distance else tested[0]
     verdict, why = AMBIGUOUS, "the interval holds both a difference and none"
     if p is None:
         why = _unable(a, b, few_launches) or ""
     elif 1 / (1 + margin) < ratio.low and ratio.high < 1 + margin:
         verdict, why = SAME, "the interval lies within the margin"
-    elif ratio.excludes_one and p < 1 - statistics.CONFIDENCE:
+    elif ratio.excludes_one and p < 1 - intervals.CONFIDENCE:
         verdict, why = (SLOWER if ratio.low > 1 else FASTER), "the interval excludes 1, and so does the test after Holm"
     elif ratio.excludes_one:
         why = "the interval excludes 1, but not after Holm's correction over all points"
     elif tested[0].excludes_one:
         why = "the interval excludes 1, but A moves as far between two runs"
-    return Row(name, a, b, ratio, 1.0 if p is None else p, statistics.superiority(b, a), verdict, why,
+    return Row(name, a, b, ratio, 1.0 if p is None else p, rank_tests.superiority(b, a), verdict, why,
                "none" if p is None else tested[2], distance)
 
 
@@ -217,6 +220,6 @@ def common_shift(outcome: Outcome) -> float | None:
     if not len(values):
         return None
     most = int(max(np.sum(values > 1), np.sum(values < 1)))
-    if most < COMMON_SHIFT_SHARE * len(values) or stats.binomtest(most, len(values)).pvalue >= 1 - statistics.CONFIDENCE:
+    if most < COMMON_SHIFT_SHARE * len(values) or stats.binomtest(most, len(values)).pvalue >= 1 - intervals.CONFIDENCE:
         return None
     return float(np.median(values))

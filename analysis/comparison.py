@@ -7,9 +7,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Collection
 
-from . import nodes, statistics, steadiness, text
+from . import nodes, steadiness, text
 from .load import Config, Record, Study
-from .statistics import Comparison, Estimate
+from .statistics import estimates
+from .statistics.estimates import Estimate
+from .statistics.fastest import Comparison, compare_with_best
 from .steadiness import Steadiness
 
 # Two points are compared only if these are equal: same picture, same arithmetic, same region, same cache state.
@@ -95,7 +97,7 @@ class Analysis:
     def __init__(self, study: Study) -> None:
         self.study = study
         self._extra = self._varying_extras()
-        self.estimates = {record.id: statistics.median_estimate(record.samples) for record in study.every_record if record.ok}
+        self.estimates = {record.id: estimates.median_estimate(record.samples) for record in study.every_record if record.ok}
         self.groups = self._groups()
         self.serial_base = {record.id: self._find_serial_base(record) for record in study.timed}
         self.thread_base = {record.id: self._find_thread_base(record) for record in study.timed}
@@ -176,7 +178,7 @@ class Analysis:
     def _compared(self, group: Group, families: int) -> Group:
         timed = group.timed
         if timed:
-            best, comparisons = statistics.compare_with_best([r.samples for r in timed], self.study.target, families)
+            best, comparisons = compare_with_best([r.samples for r in timed], self.study.target, families)
             group.best = timed[best]
             group.comparisons = {record.id: c for record, c in zip(timed, comparisons)}
         return group
@@ -221,7 +223,7 @@ class Analysis:
             return None
         key = (base.id, record.id)
         if key not in self._ratios:
-            self._ratios[key] = statistics.ratio(base.samples, record.samples)
+            self._ratios[key] = estimates.ratio(base.samples, record.samples)
         return self._ratios[key]
 
     @cached_property
@@ -245,7 +247,7 @@ class Analysis:
         panels = []
         for group, kernel, threads, cells in found:
             timed = [r for r in cells.values() if r.ok]
-            _, comparisons = statistics.compare_with_best([r.samples for r in timed], self.study.target, len(found))
+            _, comparisons = compare_with_best([r.samples for r in timed], self.study.target, len(found))
             panels.append(Panel(group, kernel, threads, cells, {r.id: c for r, c in zip(timed, comparisons)}))
         return panels
 

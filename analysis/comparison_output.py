@@ -16,10 +16,12 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from scipy import stats
 
-from . import contexts, sidecars, statistics, style, text, writing
+from . import contexts, sidecars, style, text, writing
 from .captions import Caption, Facts
 from .compare import AMBIGUOUS, CHOSEN, FASTER, SAME, SLOWER, DECIDED_SHARE, VERDICTS, Outcome, Row, Run, common_shift
 from .figures import common
+from .statistics import intervals, rank_tests
+from .statistics.samples import Samples
 from .tables import Table
 
 # Colour, marker and filling, so that a verdict can be read in grey, too.
@@ -80,15 +82,15 @@ def _power(outcome: Outcome) -> list[str]:
     if not judged:
         return ["No point has the samples and launches for a test: whatever the times, none could be called FASTER or SLOWER."]
     lines = []
-    assumed = sum(row.test == statistics.WELCH for row in judged)
+    assumed = sum(row.test == rank_tests.WELCH for row in judged)
     if assumed:
         lines.append(f"Too few samples for a rank test to survive Holm over {text.count(len(judged), 'point')}: {assumed} of them use Welch's"
                      " t on logarithms, which assumes a distribution.")
-    few = [row for row in judged if min(row.a.launch_count, row.b.launch_count) < statistics.MIN_LAUNCHES]
+    few = [row for row in judged if min(row.a.launch_count, row.b.launch_count) < intervals.MIN_LAUNCHES]
     if few:
-        lines.append(f"{text.count(len(few), 'point')} judged with fewer than {statistics.MIN_LAUNCHES} launches on a side: such a verdict is one on"
+        lines.append(f"{text.count(len(few), 'point')} judged with fewer than {intervals.MIN_LAUNCHES} launches on a side: such a verdict is one on"
                      " those processes, and others may differ by as much.")
-    level = (1 - statistics.CONFIDENCE) / len(judged)
+    level = (1 - intervals.CONFIDENCE) / len(judged)
     launches = [min(row.a.launch_count, row.b.launch_count) for row in judged if min(row.a.launch_count, row.b.launch_count) > 1]
     if launches:
         least = min(launches)
@@ -110,7 +112,7 @@ def _yardstick(outcome: Outcome) -> str:
             f" {text.percent(max(distances))}.")
 
 
-def _median(samples: statistics.Samples) -> float:
+def _median(samples: Samples) -> float:
     return float(np.median(samples.values))
 
 

@@ -19,10 +19,13 @@ import matplotlib
 import numpy as np
 import pandas as pd
 
-from . import load, sidecars, statistics, style, text, writing
+from . import load, sidecars, style, text, writing
 from .comparison import execution
 from .load import Config, InputError, Record, Study
-from .statistics import Estimate, Samples, is_number
+from .statistics import intervals
+from .statistics.estimates import Estimate
+from .statistics.numbers import is_number
+from .statistics.samples import Samples
 from .tables import Table, columns, times
 
 SCHEMA = 1
@@ -74,7 +77,7 @@ def launch_medians(samples: Samples) -> dict[int, float]:
 
 
 def over_rounds(values: list[float]) -> Estimate:
-    bounds = statistics.order_interval(values)
+    bounds = intervals.order_interval(values)
     low, high = bounds if bounds else (None, None)
     return Estimate(float(np.median(values)), low, high, len(values), INTERVAL if bounds else "none", "" if bounds else "fewer than 6 rounds")
 

@@ -11,12 +11,15 @@ import math
 from dataclasses import dataclass, replace
 from typing import Callable, Iterator
 
-from . import hypotheses, nodes, statistics, text, trade_text
+from . import hypotheses, nodes, text, trade_text
 from .comparison import EXTRA_AXES, Analysis, Group, Panel
 from .figures.balance import imbalance
 from .figures.scaling import curves
 from .load import Record
-from .statistics import Comparison, Estimate
+from .statistics import estimates, intervals, rank_tests
+from .statistics.estimates import Estimate
+from .statistics.fastest import Comparison, compare_with_best
+from .statistics.samples import paired_samples
 
 COUNT = 3
 
@@ -61,11 +64,11 @@ def fastest(analysis: Analysis) -> Iterator[Finding]:
             tail = f"; {text.count(len(own), 'other point')} of {best.config.kernel} cannot be told apart from it" if own else ""
             yield Finding("fastest", 4 + min(1.5, cautious(ratio)), f"On {where(group)} {analysis.label(best)} is the fastest kernel:"
                           f" {analysis.time(best)}, {by(ratio)} faster than the runner-up {analysis.label(runner)}{tail}.")
-        elif 1 < best.samples.launch_count < statistics.MIN_LAUNCHES and all(group.comparisons[r.id].ratio.excludes_one for r in equal):
+        elif 1 < best.samples.launch_count < intervals.MIN_LAUNCHES and all(group.comparisons[r.id].ratio.excludes_one for r in equal):
             # A test over two or three launches finds nothing, however far apart they are.
             yield Finding("fastest", 2.5, f"On {where(group)} {analysis.label(best)} ({analysis.time(best)}) is"
                           f" {by(group.comparisons[runner.id].ratio)} faster than the runner-up {analysis.label(runner)} in these"
-                          f" {best.samples.launch_count} launches, too few to say so of others ({statistics.MIN_LAUNCHES} would do).")
+                          f" {best.samples.launch_count} launches, too few to say so of others ({intervals.MIN_LAUNCHES} would do).")
         else:
             equal = sorted(equal, key=lambda r: analysis.estimates[r.id].value)
             names = text.listing([f"{analysis.label(r)} ({analysis.time(r)})" for r in equal], 2)
@@ -101,7 +104,7 @@ def parallel_gain(analysis: Analysis) -> Iterator[Finding]:
             continue
         # Both are the best of several, so the test is corrected for all points that could have been picked.
         family = len(analysis.study.timed)
-        p = family * statistics.rank_test(base.samples, parallel.samples, family)[0]
+        p = family * rank_tests.rank_test(base.samples, parallel.samples, family)[0]
         over = f"the fastest serial kernel ({base.config.kernel}, {analysis.time(base)})"
         if gain.excludes_one and p < 0.05:
             word = "faster" if gain.value > 1 else "slower"
@@ -134,8 +137,8 @@ def scaling(analysis: Analysis) -> Iterator[Finding]:
         (least, worst), (most, good) = reached[0], reached[-1]
         bases = f"one-thread times {_seconds(analysis, good)} s and {_seconds(analysis, worst)} s"
         # Speedups are compared as samples of their own: time on all threads / time on one, the lowest is the best.
-        relative = [statistics.paired_samples(r.samples, analysis.thread_base[r.id].samples) for _, r in reached]
-        apart = len(reached) > 1 and all(samples.n for samples in relative) and statistics.compare_with_best(
+        relative = [paired_samples(r.samples, analysis.thread_base[r.id].samples) for _, r in reached]
+        apart = len(reached) > 1 and all(samples.n for samples in relative) and compare_with_best(
             relative, analysis.study.target, len(analysis.groups))[1][0].verdict == "slower" and most.low > least.high
         if most.high < 1:
             yield Finding("scaling", 3.0 + min(1.0, cautious(most)), f"On {where(group)} no kernel gains from {threads} threads: {good.config.kernel}"
@@ -147,7 +150,7 @@ def scaling(analysis: Analysis) -> Iterator[Finding]:
                           f" {by(most)} over itself on one thread, and {worst.config.kernel} ({analysis.execution(worst)}) least,"
                           f" {by(least)} ({bases}).")
         else:
-            efficiency = statistics.efficiency(most, threads)
+            efficiency = estimates.efficiency(most, threads)
             yield Finding("scaling", 1.6, f"On {where(group)} {analysis.label(good)} runs {by(most)} as fast as on one thread"
                           f" ({_seconds(analysis, good)} s), an efficiency of"
                           f" {text.estimate(efficiency.value, efficiency.low, efficiency.high)}"
@@ -175,7 +178,7 @@ def schedules(analysis: Analysis) -> Iterator[Finding]:
         cases += [(panel, records[0].config.backend, records) for records in alike.values() if len(records) > 1]
     for panel, backend, timed in cases:
         group, threads = panel.group, text.count(panel.threads, "thread")
-        index, comparisons = statistics.compare_with_best([r.samples for r in timed], analysis.study.target, len(cases))
+        index, comparisons = compare_with_best([r.samples for r in timed], analysis.study.target, len(cases))
         best = timed[index]
         slower = [(c, r) for c, r in zip(comparisons, timed) if c.verdict == "slower"]
         if slower:
@@ -211,7 +214,7 @@ def backends(analysis: Analysis) -> Iterator[Finding]:
         sides = [analysis.fastest([r for r in records if r.config.backend == b])
                  for b in dict.fromkeys(r.config.backend for r in records)]
         # Each side is its own best of several, so the family is all points of both sides.
-        _, comparisons = statistics.compare_with_best([r.samples for r in records], analysis.study.target, len(cases))
+        _, comparisons = compare_with_best([r.samples for r in records], analysis.study.target, len(cases))
         judged: dict[str, Comparison] = {r.id: c for r, c in zip(records, comparisons)}
         sides.sort(key=lambda r: _median(analysis, r))
         first, second = sides[0], sides[1]
@@ -229,7 +232,7 @@ def stage_share(analysis: Analysis) -> Iterator[Finding]:
         best = group.best
         if best is None or not best.stages:
             continue
-        shares = {name: statistics.share(values, best.samples.values) for name, values in best.stages.items()}
+        shares = {name: estimates.share(values, best.samples.values) for name, values in best.stages.items()}
         name, share = max(shares.items(), key=lambda item: item[1].value)
         if share.has_interval:
             yield Finding("stage", 1.2 + (0.8 if name != "raster" else 0), f"On {where(group)} {name} is the longest stage of"
@@ -308,7 +311,7 @@ def plain_facts(analysis: Analysis) -> Iterator[Finding]:
         yield Finding("noise", 0.5, f"The widest interval is ±{text.percent(width)} of its median ({analysis.label(record)} on"
                       f" {where(analysis.group_of(record))}, {analysis.time(record)}); the target is ±{text.percent(study.target)}.")
     else:
-        yield Finding("noise", 0.5, f"No point has {statistics.MIN_SAMPLES} samples, so there are no intervals and no differences can"
+        yield Finding("noise", 0.5, f"No point has {intervals.MIN_SAMPLES} samples, so there are no intervals and no differences can"
                       " be claimed.")
     samples = sum(r.samples.n for r in study.timed)
     yield Finding("extent", 0.3, f"{text.count(len(study.timed), 'point')} conform to their numeric mode and were timed, with"

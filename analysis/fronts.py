@@ -9,7 +9,8 @@ from typing import Callable
 
 from . import text
 from .load import Record
-from .statistics import Estimate, is_number
+from .statistics.estimates import Estimate
+from .statistics.numbers import is_number
 
 LITERAL = "literal program"
 

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from .load import InputError, parse, read_text
-from .statistics import Samples, is_number
+from .statistics.numbers import is_number
+from .statistics.samples import Samples
 
 # Of a run, not of its conditions; the executable is a path.
 MEASURED = ("date", "executable", "load_avg")

@@ -15,15 +15,17 @@ from typing import Any, Iterator
 
 import pandas as pd
 
-from . import statistics, text
+from . import text
 from .comparison import Analysis
 from .load import Hypothesis, Record
-from .statistics import Estimate, Samples
+from .statistics import estimates, intervals, launch_tests, rank_tests
+from .statistics.estimates import Estimate
+from .statistics.samples import Samples
 from .tables import Table, columns
 
 SECTION = "Hypotheses"
 SUPPORTED, REFUTED, UNDECIDED, NOT_TESTED = "supported", "refuted", "undecided", "not tested"
-LEVEL = 1 - statistics.CONFIDENCE
+LEVEL = 1 - intervals.CONFIDENCE
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,7 @@ def verdicts(analysis: Analysis) -> list[Verdict]:
     for number, (one, reason) in enumerate(zip(stated, reasons), start=1):
         found.append(Verdict(number, one, NOT_TESTED, reason) if reason else _tested(analysis, number, one, known, family))
     tested = [i for i, verdict in enumerate(found) if verdict.tested]
-    for i, p in zip(tested, statistics.holm([found[i].p for i in tested])):
+    for i, p in zip(tested, rank_tests.holm([found[i].p for i in tested])):
         found[i] = replace(found[i], p_holm=p, word=_word(found[i], p))
     return found
 
@@ -94,15 +96,15 @@ def _tested(analysis: Analysis, number: int, one: Hypothesis, known: dict[str, R
     supports = len(faster) * min(max(above[f.id, s.id] for s in slower) for f in faster)
     refutes = len(slower) * max(min(below[f.id, s.id] for s in slower) for f in faster)
     best, least = analysis.fastest(faster), analysis.fastest(slower)
-    ratio = statistics.widened(analysis.speedup(best, least), pairs)
+    ratio = estimates.widened(analysis.speedup(best, least), pairs)
     return Verdict(number, one, UNDECIDED, "", best, least, ratio, min(1.0, supports, refutes), None, ", ".join(sorted(names)))
 
 
 def _p(faster: Samples, slower: Samples, bound: float, family: float) -> tuple[float, str]:
     """Two-sided p of a ratio equal to the bound, and the name of the test over samples."""
     shifted = replace(slower, values=slower.values / bound)
-    p, name = statistics.rank_test(shifted, faster, family)
-    return max(p, statistics.launch_tests([shifted, faster], best=1)[0]), name
+    p, name = rank_tests.rank_test(shifted, faster, family)
+    return max(p, launch_tests.launch_tests([shifted, faster], best=1)[0]), name
 
 
 def _word(verdict: Verdict, p: float) -> str:

@@ -10,12 +10,13 @@ from typing import Any, Iterator
 import numpy as np
 from scipy import stats
 
-from . import checks, hypotheses, lint_figures, severity, statistics, steadiness, text, weak
+from . import checks, hypotheses, lint_figures, severity, steadiness, text, weak
 from .lint import Finding, Folder, Rule
 from .load import Record
 from .raster_loop import busy
 from .severity import GRAVE, NOTE
-from .statistics import is_close, is_number
+from .statistics import intervals, rank_tests
+from .statistics.numbers import is_close, is_number
 
 ORDER_P = 1e-3  # of as many identical orders by chance
 STAGE_ROUNDING = 1e-3  # of a sample, by which its stages may exceed it
@@ -94,13 +95,13 @@ def determinism(folder: Folder) -> Iterator[Finding]:
 def confidence(folder: Folder) -> Iterator[Finding]:
     for record in folder.timed:
         samples, raw = record.samples, record.raw
-        if samples.launch_count < statistics.MIN_LAUNCHES:
+        if samples.launch_count < intervals.MIN_LAUNCHES:
             yield folder.record(record, severity.FEW_LAUNCHES, text.count(samples.launch_count, "launch", "launches"),
-                                f"set sampling.launches to {statistics.MIN_LAUNCHES} or more: one process has one memory layout")
-        if samples.n < statistics.MIN_SAMPLES:
+                                f"set sampling.launches to {intervals.MIN_LAUNCHES} or more: one process has one memory layout")
+        if samples.n < intervals.MIN_SAMPLES:
             yield folder.record(record, severity.FEW_SAMPLES, text.count(samples.n, "sample"), "set sampling.min_samples to 6 or more: fewer have no"
                                 " interval")
-        bounds = statistics.order_interval(samples.values)
+        bounds = intervals.order_interval(samples.values)
         stored = record.recorded_interval
         if (bounds is None) != (stored is None) or bounds and not all(map(is_close, bounds, stored)):
             yield folder.record(record, severity.OTHER_STATISTICS, f"interval_ms {stored}, the samples give {bounds}", "compute it from the samples")
@@ -122,8 +123,8 @@ def stopping(folder: Folder) -> Iterator[Finding]:
 
 def _reached(values: np.ndarray, target: float) -> bool:
     """Whether the interval was within the target after any sample: bases are sampled on after they stopped."""
-    for n in range(len(values), statistics.MIN_SAMPLES - 1, -1):
-        low, high = statistics.order_interval(values[:n])
+    for n in range(len(values), intervals.MIN_SAMPLES - 1, -1):
+        low, high = intervals.order_interval(values[:n])
         if (high - low) / 2 <= target * float(np.median(values[:n])) * (1 + 1e-9):
             return True
     return False
@@ -131,7 +132,7 @@ def _reached(values: np.ndarray, target: float) -> bool:
 
 def comparison(folder: Folder) -> Iterator[Finding]:
     for group in folder.analysis.groups:
-        assumed = [c for c in group.comparisons.values() if c.test in (statistics.WELCH, "none") and c.verdict != "best"]
+        assumed = [c for c in group.comparisons.values() if c.test in (rank_tests.WELCH, "none") and c.verdict != "best"]
         if assumed:
             yield Finding(severity.ASSUMED_TEST, "records.jsonl", group.title, f"too few samples for a rank test in {text.count(len(assumed), 'comparison')}"
                           " with the fastest", "take more samples or blocks, or compare fewer points")

@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from .statistics import Samples, is_number
+from .statistics.numbers import is_number
+from .statistics.samples import Samples
+
 
 SCHEMA = 1
 LOOP_KEYS = ("busy_mean_ms", "busy_longest_ms", "imbalance_ms", "outside_ms")  # of raster_loop; absent in older records

@@ -11,7 +11,7 @@ import numpy as np
 
 from . import load
 from .load import InputError, is_thread_count, is_whole
-from .statistics import is_number
+from .statistics.numbers import is_number
 
 # Axes of a point that decide what an iteration costs, beside those that name the loop; a study's points must have the same.
 AXES = ("scene_hash", "fill", "near", "isa", "techniques", "generality")

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .load import HELD_UP_KEYS, LOOP_KEYS, Record
-from .statistics import is_number
+from .statistics.numbers import is_number
 
 REMARK = "of the threads' medians, in records of an older version: too even where the longest thread changes from frame to frame"
 

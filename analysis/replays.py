@@ -11,7 +11,7 @@ import pandas as pd
 
 from . import load, schedule_model, text, work_stealing
 from .load import InputError, is_thread_count, is_whole
-from .statistics import is_number
+from .statistics.numbers import is_number
 from .tables import Table
 
 CONTRADICTIONS = ("contradiction", "order_contradiction")  # of a repetition: the first iteration that is one, or null

@@ -12,12 +12,13 @@ import jinja2
 import matplotlib
 from markupsafe import Markup
 
-from . import (__version__, checks, figures, findings, hypotheses, ladder, lint, lost_time, nodes, sidecars, stage_efficiency, statistics, strategy_map, style, tables, text,
+from . import (__version__, checks, figures, findings, hypotheses, ladder, lint, lost_time, nodes, sidecars, stage_efficiency, strategy_map, style, tables, text,
                trade, trade_tables, trade_text, weak, work, writing)
 from .captions import Caption
 from .comparison import Analysis
 from .figures.common import drawn_together
 from .findings import Finding
+from .statistics import intervals, numbers
 from .tables import Table
 
 MANY_SMALL = 6  # groups of few points; the tables of more are in tables/ only
@@ -83,7 +84,7 @@ def render(analysis: Analysis, sections: dict[str, list[Embedded]], found: list[
         sections=[item for item in sections.items() if item[0] != hypotheses.SECTION], context=recorded(study.context), cell_class=cell_class,
         trade_section=f"\u201c{trade.SECTION}\u201d",
         version=__version__, records=f"{text.count(len(study.every_record), 'record')} in {study.directory.name}/records.jsonl",
-        min_launches=statistics.MIN_LAUNCHES)
+        min_launches=intervals.MIN_LAUNCHES)
 
 
 def small_tables(analysis: Analysis) -> set[str]:
@@ -170,7 +171,7 @@ def noise_facts(context: dict[str, Any]) -> list[tuple[str, str]]:
 
     def spread(key: str, say: Callable[[float], str]) -> str:
         value = noise.get(key)
-        if not isinstance(value, dict) or not all(statistics.is_number(value.get(k)) for k in ("median", "worst")):
+        if not isinstance(value, dict) or not all(numbers.is_number(value.get(k)) for k in ("median", "worst")):
             return said(value)
         return f"{say(value['median'])} in the median, {say(value['worst'])} at worst"
 
@@ -203,7 +204,7 @@ def machine_facts(context: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def _bytes(value: Any) -> str:
-    if not statistics.is_number(value):
+    if not numbers.is_number(value):
         return said(value)
     for unit, size in (("GiB", 2**30), ("MiB", 2**20), ("KiB", 2**10)):
         if value >= size:

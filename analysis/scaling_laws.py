@@ -14,7 +14,9 @@ from typing import Callable, Sequence
 import numpy as np
 from scipy import optimize, stats
 
-from .statistics import CONFIDENCE, Estimate
+from .statistics.estimates import Estimate
+from .statistics.intervals import CONFIDENCE
+
 
 SPARE = 2  # thread counts beyond the parameters
 

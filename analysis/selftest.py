@@ -10,11 +10,14 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from . import load, statistics
+from . import load
 from .load import InputError
-from .statistics import Samples, is_number
+from .statistics import estimates, intervals
+from .statistics.fastest import compare_with_best
+from .statistics.numbers import is_number
+from .statistics.samples import Samples
 
-STATED = 1 - statistics.CONFIDENCE
+STATED = 1 - intervals.CONFIDENCE
 
 
 @dataclass(frozen=True)
@@ -26,7 +29,7 @@ class Outcome:
 
     def rate(self, many: int) -> tuple[float, float, float]:
         """A share of the comparisons with its exact 95 % interval (Clopper and Pearson)."""
-        interval = stats.binomtest(many, self.comparisons).proportion_ci(statistics.CONFIDENCE, method="exact")
+        interval = stats.binomtest(many, self.comparisons).proportion_ci(intervals.CONFIDENCE, method="exact")
         return many / self.comparisons, float(interval.low), float(interval.high)
 
     @property
@@ -64,9 +67,9 @@ def judge(pairs: list[tuple[Samples, Samples]]) -> Outcome:
     verdicts: Counter = Counter()
     ratios = []
     for pair in pairs:
-        best, compared = statistics.compare_with_best(pair)
+        best, compared = compare_with_best(pair)
         verdicts[compared[1 - best].verdict] += 1
-        ratios.append(statistics.ratio(*pair))
+        ratios.append(estimates.ratio(*pair))
     off = float(np.median([max(ratio.value, 1 / ratio.value) - 1 for ratio in ratios]))
     return Outcome(len(pairs), verdicts, sum(ratio.excludes_one for ratio in ratios), off)
 

@@ -25,7 +25,7 @@ from matplotlib.text import Text
 from . import load, style
 from .figures.common import Drawing
 from .load import InputError
-from .statistics import is_number
+from .statistics.numbers import is_number
 
 SCHEMA = 1
 RECORDS = "../records.jsonl"  # what a report draws, from its figures/

@@ -12,10 +12,11 @@ from pathlib import Path
 
 import pandas as pd
 
-from . import checks, statistics, text, writing
+from . import checks, text, writing
 from .comparison import PEER_AXES, Analysis, execution
 from .load import InputError, Record
-from .statistics import Estimate
+from .statistics import estimates, numbers
+from .statistics.estimates import Estimate
 from .tables import Table, columns, times
 
 HD, UHD = (1920, 1080), (3840, 2160)
@@ -114,7 +115,7 @@ def _loads(analysis: Analysis) -> dict[tuple, tuple[float, float]]:
     found = {}
     for record in analysis.study.records:
         triangles, covered = record.work.get("triangles"), record.work.get("fragments_covered")
-        if statistics.is_number(triangles) and triangles > 0 and statistics.is_number(covered):
+        if numbers.is_number(triangles) and triangles > 0 and numbers.is_number(covered):
             found[_picture(record)] = (float(triangles), covered / triangles)
     return found
 
@@ -135,7 +136,7 @@ def rows(analysis: Analysis) -> list[Row]:
         load = loads.get(_picture(record))
         goal = goal_of(config.size, *load) if load else None
         peer = next((p for p in analysis.study.peers if _picture(p) == _picture(record) and p.config.threads == config.threads), None)
-        faster = statistics.ratio(peer.samples, record.samples) if record.ok and peer is not None and peer.ok else None
+        faster = estimates.ratio(peer.samples, record.samples) if record.ok and peer is not None and peer.ok else None
         floor = (analysis.estimates[record.id].scaled(1 / record.floor_ms)
                  if record.ok and record.floor_ms is not None else None)
         judged = goal is not None and config.threads == most and config.fill == FILL and config.isa in SHARE

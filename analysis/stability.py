@@ -17,7 +17,7 @@ import pandas as pd
 
 from . import load, sidecars, style, text, writing
 from .load import InputError
-from .statistics import is_number
+from .statistics.numbers import is_number
 from .tables import Table
 
 BREAKING = 1e-3

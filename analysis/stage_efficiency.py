@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from . import statistics
 from .comparison import Analysis, Group, execution
 from .load import STAGES, Record
-from .statistics import Estimate, Samples
+from .statistics import estimates
+from .statistics.estimates import Estimate
+from .statistics.samples import Samples
 from .tables import Table, columns, times
 
 SECTION = "Stages of a frame"
@@ -59,7 +60,7 @@ def efficiencies(analysis: Analysis, group: Group) -> list[Efficiency]:
         for stage in (*STAGES, TOTAL):
             above, below = stage_samples(base, stage), stage_samples(record, stage)
             if above is not None and below is not None:
-                stages[stage] = statistics.efficiency(statistics.ratio(above, below), record.config.threads)
+                stages[stage] = estimates.efficiency(estimates.ratio(above, below), record.config.threads)
         found.append(Efficiency(record, base, stages))
     return found
 

@@ -15,9 +15,10 @@ from typing import Any, Sequence
 import numpy as np
 from scipy import stats
 
-from . import statistics, text
+from . import text
 from .load import Record
-from .statistics import Samples
+from .statistics import rank_tests
+from .statistics.samples import Samples
 
 LEVEL = 0.05  # of drift, over all points of a study
 FENCE = 3.0  # interquartile distances
@@ -44,7 +45,7 @@ class Steadiness:
 
 def judge(points: Sequence[Samples], target: float) -> list[Steadiness]:
     """Of all timed points of a study, in their order. target: the share of a median that the study asked for."""
-    corrected = statistics.holm([_trend(samples.values) for samples in points])
+    corrected = rank_tests.holm([_trend(samples.values) for samples in points])
     found = []
     for samples, p in zip(points, corrected):
         change = _change(samples.values) if p < LEVEL else 0.0

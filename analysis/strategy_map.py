@@ -10,7 +10,8 @@ import pandas as pd
 from . import text
 from .comparison import GROUP_AXES, Analysis, Group
 from .load import Record
-from .statistics import Estimate, is_number
+from .statistics.estimates import Estimate
+from .statistics.numbers import is_number
 from .tables import Table, columns, times
 from .work import family, triangles
 

@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from . import latex, statistics, steadiness, text
+from . import latex, steadiness, text
 from .comparison import EXTRA_AXES, GROUP_AXES, Analysis, Group, strategy
 from .load import Record
-from .statistics import Comparison, Estimate
+from .statistics import estimates, numbers
+from .statistics.estimates import Estimate
+from .statistics.fastest import Comparison
 
 FORMER = {"edge": "edge_ties", "depth": "depth_ties", "unexplained": "errors"}  # classes of wrong pixels in older records
 VERDICTS = {"best": "fastest", "same": "same as fastest", "ambiguous": "not told apart", "slower": "slower"}
@@ -126,7 +128,7 @@ def _peer(analysis: Analysis, group: Group, record: Record) -> tuple[dict[str, A
     said = {"kernel": strategy(record), "execution": analysis.execution(record), "threads": str(config.threads)}
     if not record.ok:
         return row, said | {"median ms [95 %]": f"{record.status}: {text.shorten(record.reason, 60)}"}
-    ratio = statistics.ratio(record.samples, group.best.samples) if group.best is not None else None
+    ratio = estimates.ratio(record.samples, group.best.samples) if group.best is not None else None
     row |= columns("median_ms", analysis.estimates[record.id]) | columns("time_over_fastest", ratio)
     row |= {"n": record.samples.n, "launches": record.samples.launch_count, "interval": analysis.estimates[record.id].kind,
             "stop": record.stop}
@@ -156,7 +158,7 @@ def _measured(analysis: Analysis, record: Record, comparison: Comparison) -> dic
     if record.floor_ms is not None:
         row |= {"floor_ms": record.floor_ms, "times_floor": _over_floor(analysis, record)}
     own = analysis.speedup(record, analysis.thread_base[record.id])
-    row |= columns("efficiency", statistics.efficiency(own, record.config.threads) if own else None)
+    row |= columns("efficiency", estimates.efficiency(own, record.config.threads) if own else None)
     return row
 
 
@@ -225,9 +227,9 @@ def over_scenes(analysis: Analysis) -> Table:
         base = min(serial, key=lambda records: _sum(analysis, records), default=None)
         for name, records in sorted(complete.items(), key=lambda item: _sum(analysis, item[1])):
             total = _sum(analysis, records)
-            ratio = None if base is None or records is base else statistics.ratio_of_sums(
+            ratio = None if base is None or records is base else estimates.ratio_of_sums(
                 [r.samples for r in base], [r.samples for r in records])
-            rate = statistics.harmonic_mean([1000 / analysis.estimates[r.id].value for r in records])
+            rate = estimates.harmonic_mean([1000 / analysis.estimates[r.id].value for r in records])
             named = "" if base is None else f"{base[0].config.kernel} serial, {text.number(_sum(analysis, base) / 1000)} s"
             numbers.append({"numeric": kind[0], "kernel": name[0], "execution": name[1], "threads": name[2], "scenes": len(groups),
                             "sum_of_medians_ms": total, **columns("speedup_of_sums", ratio), "base": named,
@@ -301,14 +303,14 @@ def _classes(oracle: dict[str, Any]) -> list[Any]:
     if "wrong" in oracle:
         return [oracle.get(key) for key in ("wrong", "exact_ties", *FORMER, "unbounded")]
     former = [oracle.get(key) for key in FORMER.values()]
-    known = [count for count in former if statistics.is_number(count)]
+    known = [count for count in former if numbers.is_number(count)]
     return [sum(known) if known else None, None, *former, None]
 
 
 def _peer_verdict(truth: dict[str, Any]) -> list[Any]:
     """The cells of a peer's row: it cannot conform, and ties that its bound explains are its edges and depths."""
     errors = truth.get("errors")
-    said = "within its bound" if errors == 0 else "outside its bound" if statistics.is_number(errors) else "not judged"
+    said = "within its bound" if errors == 0 else "outside its bound" if numbers.is_number(errors) else "not judged"
     return [None, None, said, truth.get("wrong"), None, truth.get("edge_ties"), truth.get("depth_ties"), errors, None,
             truth.get("max_depth_error_steps")]
 

@@ -17,7 +17,7 @@ from matplotlib.image import imread
 
 from . import load, sidecars, style, text, writing
 from .load import InputError, is_thread_count, is_whole
-from .statistics import is_number
+from .statistics.numbers import is_number
 from .tables import Table
 
 SHARES = {"before": "before the first chunk", "chunks": "in chunks", "between": "between chunks: handing out, and the trace's stamps",

@@ -14,11 +14,12 @@ from functools import lru_cache
 
 import numpy as np
 
-from . import statistics, text
+from . import text
 from .comparison import GROUP_AXES, Analysis, slug
 from .fronts import LITERAL, MEASURES, WRONG, Front, Mark, Measure, Worst, front
 from .load import Record
-from .statistics import Estimate
+from .statistics import estimates, intervals, launch_tests, rank_tests
+from .statistics.estimates import Estimate
 
 SECTION = "Speed against accuracy"
 LITERAL_MODE, LITERAL_KERNELS = "two_product", ("all_pixels", "bounding_box")
@@ -186,7 +187,7 @@ class Trade:
     def against(self, bases: list[Record], records: list[Record]) -> Estimate:
         """The speedup on one picture, or its geometric mean over several."""
         ratios = [self.over(base, record) for base, record in zip(bases, records)]
-        return ratios[0] if len(ratios) == 1 else statistics.geometric_mean(ratios)
+        return ratios[0] if len(ratios) == 1 else estimates.geometric_mean(ratios)
 
     def is_literal(self, record: Record | None) -> bool:
         config = record.config if record is not None else None
@@ -223,7 +224,7 @@ class Trade:
             if better.error < worse.error and ratio.low > 1 - self.analysis.study.target:
                 return True  # less wrong, and by its interval not slower by more than the study resolves
             if view.several:
-                return statistics.widened(ratio, pairs).low > 1
+                return estimates.widened(ratio, pairs).low > 1
             return ratio.low > 1 and self._significant(worse.records[0], better.records[0], pairs * len(self.pictures))
 
         return front(measure, marks, dominates)
@@ -237,10 +238,10 @@ class Trade:
         return Mark(name, tuple(records), speedup, float(np.mean(errors)), max(each, key=lambda w: (w.error, -w.speedup)))
 
     def _significant(self, slower: Record, faster: Record, family: float) -> bool:
-        """The tests of statistics.compare_with_best, for all pairs of modes of all pictures (Bonferroni)."""
-        p = max(statistics.rank_test(slower.samples, faster.samples, family)[0],
-                statistics.launch_tests([slower.samples, faster.samples], best=1)[0])
-        return p * family < 1 - statistics.CONFIDENCE
+        """The tests of compare_with_best, for all pairs of modes of all pictures (Bonferroni)."""
+        p = max(rank_tests.rank_test(slower.samples, faster.samples, family)[0],
+                launch_tests.launch_tests([slower.samples, faster.samples], best=1)[0])
+        return p * family < 1 - intervals.CONFIDENCE
 
 
 def _like(record: Record) -> tuple:

@@ -6,12 +6,13 @@ from typing import Any, Callable
 
 import pandas as pd
 
-from . import fronts, statistics, text, trade
+from . import fronts, text, trade
 from .comparison import Analysis
 from .load import Record
-from .statistics import Estimate
 from .tables import Table, accuracy, columns, times
 from .fronts import LITERAL
+from .statistics import estimates, numbers
+from .statistics.estimates import Estimate
 from .trade import LIKE_AXES, SECTION, Picture, Trade
 
 REFERENCES = ("f32", "f64")
@@ -126,7 +127,7 @@ def _over_scenes(whole: Trade) -> Table:
             mark = next((marks[key][mode] for key in marks if mode in marks[key]), None)
             if mark is None:
                 continue
-            total = statistics.ratio_of_sums([r.samples for r in view.bases], [r.samples for r in records])
+            total = estimates.ratio_of_sums([r.samples for r in view.bases], [r.samples for r in records])
             point = whole.analysis.label(records[0])
             row: dict[str, Any] = {"scenes": view.title, "mode": mode, "point": point} | columns("speedup_geometric_mean", mark.speedup)
             row |= columns("speedup_of_sums", total)
@@ -199,7 +200,7 @@ def _costs_over_scenes(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
         scenes = max(map(len, ratios.values()))
         if scenes > 1:
             means.append({"scene": text.count(scenes, "scene"), **dict(zip(("kernel", "execution", "threads", "isa", "mode"), key)),
-                          "ratios": {r: statistics.geometric_mean(e) for r, e in ratios.items() if len(e) == scenes}})
+                          "ratios": {r: estimates.geometric_mean(e) for r, e in ratios.items() if len(e) == scenes}})
     return means
 
 
@@ -278,17 +279,17 @@ def _rays(verdict: dict[str, Any]) -> str:
 
 
 def _count(value: object) -> str:
-    return f"{value:,.0f}" if statistics.is_number(value) else text.MISSING
+    return f"{value:,.0f}" if numbers.is_number(value) else text.MISSING
 
 
 def _counts(source: dict[str, Any], first: str, *rest: str) -> str:
-    if not statistics.is_number(source.get(first)):
+    if not numbers.is_number(source.get(first)):
         return text.MISSING
     return f"{_count(source[first])} ({', '.join(_count(source.get(key)) for key in rest)})"
 
 
 def _slashed(source: dict[str, Any], *keys: str) -> str:
-    return "/".join(_count(source.get(key)) for key in keys) if any(statistics.is_number(source.get(k)) for k in keys) else text.MISSING
+    return "/".join(_count(source.get(key)) for key in keys) if any(numbers.is_number(source.get(k)) for k in keys) else text.MISSING
 
 
 def _bounds(whole: Trade) -> Table:

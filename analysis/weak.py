@@ -9,7 +9,7 @@ import pandas as pd
 from . import text
 from .comparison import Analysis, Group, slug, strategy
 from .load import Record, WeakSeries
-from .statistics import Estimate
+from .statistics.estimates import Estimate
 from .tables import Table, columns, times
 
 SECTION = "Weak scaling"

@@ -14,13 +14,15 @@ import matplotlib
 import numpy as np
 import pandas as pd
 
-from . import load, replays, scaling_laws, schedule_model, sidecars, statistics, style, text, work_stealing, writing
+from . import load, replays, scaling_laws, schedule_model, sidecars, style, text, work_stealing, writing
 from .comparison import Analysis
 from .load import InputError, Record, Study
 from .loop_costs import LoopCosts, read
 from .scaling_laws import Fit
 from .schedule_model import Outcome
-from .statistics import Estimate, Samples
+from .statistics import estimates
+from .statistics.estimates import Estimate
+from .statistics.samples import Samples
 from .tables import Table
 
 CAVEAT = "Predictions are contention-free"
@@ -185,8 +187,8 @@ def measured(model: Model, directory: Path, scene: str | None) -> Comparison:
             continue
         chunk = record.config.chunk if record.config.chunk is not None or rule.schedule == "static" else 1
         base = _one_thread([r for r in mine if all(getattr(r.config, axis) == getattr(record.config, axis) for axis in CONDITIONS)], of_loop)
-        points.append(Measured(record, model.predict(rule, chunk, record.config.threads), statistics.median_estimate(loop),
-                               None if base is None else statistics.ratio(base, loop)))
+        points.append(Measured(record, model.predict(rule, chunk, record.config.threads), estimates.median_estimate(loop),
+                               None if base is None else estimates.ratio(base, loop)))
     # The runtime of a backend is its own: only where one backend has several does it tell points apart.
     varied = [axis for axis in SERIES if any(len({getattr(p.record.config, axis) for p in points if p.record.config.backend == backend}) > 1
                                              for backend in {p.record.config.backend for p in points})]

@@ -11,7 +11,7 @@ import pandas as pd
 from . import text
 from .comparison import Analysis, strategy
 from .load import Record
-from .statistics import is_number
+from .statistics.numbers import is_number
 from .tables import Table, columns, times
 
 SECTION = "Time against work"

@@ -6,9 +6,10 @@ from typing import Iterator
 
 from matplotlib.lines import Line2D
 
-from .. import statistics, style, text
+from .. import style, text
 from ..adopt import Adoption
 from ..captions import Caption, Facts
+from ..statistics import estimates, intervals
 from .common import Block, Drawing, Point, Row, bounds, dots, named, pages, part, spread
 from .scaling import curve, thread_axis
 
@@ -34,8 +35,8 @@ def _scaling(adoption: Adoption) -> Drawing:
     for i, schedule in enumerate(schedules):
         speedups = {point.threads: adoption.speedup(point) for point in adoption.line(schedule)}
         curve(panels[0], speedups, i)
-        curve(panels[1], {n: statistics.efficiency(e, n) for n, e in speedups.items()}, i)
-        seconds = statistics.median_estimate(adoption.base(schedule).samples).value / 1000
+        curve(panels[1], {n: estimates.efficiency(e, n) for n, e in speedups.items()}, i)
+        seconds = estimates.median_estimate(adoption.base(schedule).samples).value / 1000
         look = style.look(i)
         keys.append(Line2D([], [], color=look.colour, marker=look.marker, ms=4, label=f"{schedule}: base {text.number(seconds)} s"))
     for axes, title, ideal in zip(panels, ("speedup over one thread", "efficiency: speedup / threads"), (counts, [1] * len(counts))):
@@ -66,7 +67,7 @@ def _times(adoption: Adoption) -> Iterator[Drawing]:
     for schedule in adoption.schedules:
         points = []
         for point in adoption.line(schedule):
-            time = statistics.median_estimate(point.samples)
+            time = estimates.median_estimate(point.samples)
             points.append(Point(time.value, time.low, time.high, threads.index(point.threads), ringed=id(point) in near))
         rows.append(Row(schedule, tuple(points)))
     every = [p for row in rows for p in row.points]
@@ -79,11 +80,11 @@ def _times(adoption: Adoption) -> Iterator[Drawing]:
         caption = Caption(
             f"Time by schedule and threads of {adoption.title}{part(page, len(split))}",
             " ".join([
-                _estimates("medians", adoption, statistics.median_estimate(adoption.points[0].samples).kind),
+                _estimates("medians", adoption, estimates.median_estimate(adoption.points[0].samples).kind),
                 f"Ringed: the fastest point ({best.name}) and those that cannot be told apart from it (rank test, Holm-corrected, and"
                 " paired interval).", *_notes(adoption)]),
             "Left is faster. Where intervals overlap or both points are ringed, do not name a winner.",
-            _facts("medians", adoption, statistics.median_estimate(adoption.points[0].samples).kind, None))
+            _facts("medians", adoption, estimates.median_estimate(adoption.points[0].samples).kind, None))
         yield Drawing(named("adopt_times", page, len(split)), SECTION, figure, caption)
 
 
@@ -95,7 +96,7 @@ def _facts(what: str, adoption: Adoption, kind: str, base: str | None) -> Facts:
 
 
 def _has_intervals(adoption: Adoption) -> bool:
-    return all(point.samples.n >= statistics.MIN_SAMPLES for point in adoption.points)
+    return all(point.samples.n >= intervals.MIN_SAMPLES for point in adoption.points)
 
 
 def _estimates(what: str, adoption: Adoption, kind: str) -> str:

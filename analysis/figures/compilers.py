@@ -12,7 +12,7 @@ from ..captions import Caption, Facts
 from ..comparison import slug
 from ..compilers import Cell, Comparison, INTERVAL, time, where
 from ..load import Config
-from ..statistics import Estimate
+from ..statistics.estimates import Estimate
 from .common import Drawing
 
 SECTION = "Compilers"

@@ -8,10 +8,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from .. import captions, statistics, style, text
+from .. import captions, style, text
 from ..comparison import Analysis, Group
 from ..load import Record
-from ..statistics import Estimate
+from ..statistics import estimates
+from ..statistics.estimates import Estimate
 from . import floors
 from .common import Block, Drawing, Row, drawn_together, bounds, dots, execution_rows, named, pages, part, spread
 from .times import point, thread_series
@@ -73,7 +74,7 @@ def _summary(analysis: Analysis, group: Group, best: dict[str, tuple[str, list[R
         base = analysis.thread_base[records[-1].id]
         own = {r.config.threads: _self(analysis, r, base) for r in records}
         curve(axes[0], own, i)
-        curve(axes[1], {p: statistics.efficiency(e, p) for p, e in own.items()}, i)
+        curve(axes[1], {p: estimates.efficiency(e, p) for p, e in own.items()}, i)
         limits[0].append(floors.ceilings(floor, analysis.estimates[base.id].value, counts))
         limits[1].append({p: ceiling / p for p, ceiling in limits[0][-1].items()})
         name = f"{kernel}, {execution}: base (b) {seconds(analysis, base)}"

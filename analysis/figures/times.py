@@ -7,7 +7,7 @@ from typing import Iterator
 from .. import captions, text
 from ..comparison import Analysis, Group, strategy
 from ..load import Record
-from ..statistics import Estimate
+from ..statistics.estimates import Estimate
 from . import floors
 from .common import Block, Drawing, Point, Row, bounds, dots, drawn_together, execution_rows, named, pages, part, peer_blocks, spread, untimed_rows
 

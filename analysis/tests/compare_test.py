@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 from .. import __main__ as program
-from .. import compare, comparison_output, statistics, writing
+from .. import compare, comparison_output, writing
+from ..statistics import launch_tests, runs
+from ..statistics.samples import Samples
 from . import synthetic
 from .conftest import FEW
 
@@ -129,7 +131,7 @@ def many_points(factor, points, samples, launches, seed, common=0.0, own=0.0):
     shift = rng.normal(0, common)
     times = {f"p{i}": 10 * factor * np.exp(shift + rng.normal(0, own) + rng.normal(0, 0.002, samples)) for i in range(points)}
     places = np.arange(samples)
-    return compare.Run(Path("run"), {}, {name: statistics.Samples(values, places % launches, places) for name, values in times.items()},
+    return compare.Run(Path("run"), {}, {name: Samples(values, places % launches, places) for name, values in times.items()},
                        {}, {}, {}, 0.02, True)
 
 
@@ -150,20 +152,20 @@ def test_a_point_without_a_test_costs_the_others_nothing():
     a, b = many_points(1, 40, 12, 6, 1), many_points(1.01, 40, 12, 6, 2)
     alone = {row.name: row.p for row in compare.compare(a, b).rows}
     for run_ in (a, b):
-        run_.samples.update({f"few{i}": statistics.Samples(np.ones(3), np.arange(3), np.arange(3)) for i in range(500)})
+        run_.samples.update({f"few{i}": Samples(np.ones(3), np.arange(3), np.arange(3)) for i in range(500)})
     assert {row.name: row.p for row in compare.compare(a, b).rows if row.name in alone} == pytest.approx(alone)
 
 
 def test_most_points_undecided_is_a_code_of_its_own():
     a, b = many_points(1, 4, 12, 6, 1), many_points(1, 4, 12, 6, 2)
     assert compare.compare(a, b).status == 0
-    few = statistics.Samples(np.ones(3), np.arange(3), np.arange(3))
+    few = Samples(np.ones(3), np.arange(3), np.arange(3))
     for name in ("p0", "p1"):
         b.samples[name] = few
     assert compare.compare(a, b).status == 0  # half of them
     b.samples["p2"] = few
     assert compare.compare(a, b).status == 4
-    b.samples["p3"] = statistics.Samples(2 * a.samples["p3"].values, a.samples["p3"].launches, a.samples["p3"].blocks)
+    b.samples["p3"] = Samples(2 * a.samples["p3"].values, a.samples["p3"].launches, a.samples["p3"].blocks)
     assert compare.compare(a, b).status == 1  # one that is slower is known, whatever the others
 
 
@@ -189,7 +191,7 @@ def test_the_yardstick_holds_what_it_states(common, own, repeats):
     missed, trials = 0, 1500
     for _ in range(trials):
         logs = rng.normal(0, common, repeats + 2) + rng.normal(0, own, (12, repeats + 2))
-        missed += bool(np.any(np.abs(logs[:, -1] - logs[:, 0]) > statistics.yardstick(logs[:, :-1])))
+        missed += bool(np.any(np.abs(logs[:, -1] - logs[:, 0]) > runs.yardstick(logs[:, :-1])))
     assert missed < 0.065 * trials  # 5 % of whole comparisons of 12 points
 
 
@@ -224,9 +226,9 @@ def test_runs_are_not_paired():
     rng = np.random.default_rng(5)
     launches, blocks = np.repeat(np.arange(5), 4), np.tile(np.arange(4), 5)
     values, others = np.exp(rng.normal(0, 0.1, (2, 20)))
-    base = statistics.Samples(others, launches, blocks)
-    straight = statistics.between_runs(statistics.Samples(values, launches, blocks), base)
-    turned = statistics.between_runs(statistics.Samples(values, 4 - launches, 3 - blocks), base)
+    base = Samples(others, launches, blocks)
+    straight = runs.between_runs(Samples(values, launches, blocks), base)
+    turned = runs.between_runs(Samples(values, 4 - launches, 3 - blocks), base)
     assert straight[0].value == turned[0].value and straight[1] == pytest.approx(turned[1])
 
 
@@ -234,9 +236,9 @@ def test_welch_over_launches_agrees_with_scipy():
     from scipy import stats
     rng = np.random.default_rng(6)
     launches = np.repeat(np.arange(6), 3)
-    a, b = (statistics.Samples(np.exp(rng.normal(m, 0.05, 18)), launches, np.tile(np.arange(3), 6)) for m in (0.0, 0.1))
-    expected = stats.ttest_ind(statistics.launch_medians(b), statistics.launch_medians(a), equal_var=False)
-    estimate, p, _ = statistics.between_runs(b, a)
+    a, b = (Samples(np.exp(rng.normal(m, 0.05, 18)), launches, np.tile(np.arange(3), 6)) for m in (0.0, 0.1))
+    expected = stats.ttest_ind(launch_tests.launch_medians(b), launch_tests.launch_medians(a), equal_var=False)
+    estimate, p, _ = runs.between_runs(b, a)
     assert p == pytest.approx(expected.pvalue)
     assert estimate.low < np.exp(0.1) < estimate.high
 

@@ -15,7 +15,7 @@ from .. import __main__ as program
 from .. import compilers, lint, lint_figures, load, sidecars
 from ..comparison import Analysis
 from ..severity import GRAVE
-from ..statistics import Samples
+from ..statistics.samples import Samples
 from . import synthetic
 
 ROUNDS, BLOCKS = 7, 6

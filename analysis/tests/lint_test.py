@@ -14,6 +14,7 @@ from .. import __main__ as program
 from .. import checks, lint, lint_rules, sidecars, style
 from ..captions import Caption
 from ..figures.common import Drawing
+from ..statistics import intervals
 from . import synthetic, synthetic_modes
 from .conftest import FEW, analyse
 
@@ -112,7 +113,7 @@ def drift(entry):
 
 def restate(entry):
     values = np.array(entry["samples_ms"])
-    bounds = lint_rules.statistics.order_interval(values)
+    bounds = intervals.order_interval(values)
     entry.update(median_ms=float(np.median(values)), interval_ms=list(bounds), min_ms=float(values.min()), max_ms=float(values.max()),
                  p95_ms=None)
 

@@ -11,7 +11,8 @@ import pandas as pd
 import pytest
 
 from .. import __main__ as program
-from .. import speed, statistics
+from .. import speed
+from ..statistics import intervals
 from . import synthetic
 from .conftest import analyse
 from .peer_test import peer_of
@@ -22,7 +23,7 @@ SMALL = speed.GOALS[0]
 
 
 def timed(entry: dict[str, Any], samples: np.ndarray) -> None:
-    bounds = statistics.order_interval(samples)
+    bounds = intervals.order_interval(samples)
     entry.update(samples_ms=samples.tolist(), launches=[0] * len(samples), blocks=list(range(len(samples))),
                  median_ms=float(np.median(samples)), interval_ms=list(bounds) if bounds else None, min_ms=float(samples.min()),
                  max_ms=float(samples.max()), stages_ms={"raster": samples.tolist()})

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from .. import steadiness
-from ..statistics import Samples
+from ..statistics.samples import Samples
 
 
 def samples(values):

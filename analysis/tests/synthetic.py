@@ -10,7 +10,8 @@ from typing import Any, Callable
 
 import numpy as np
 
-from .. import statistics
+from ..statistics import intervals
+
 
 KERNELS = {  # name: (share of the slowest, parallel share, tile)
     "all_pixels": (1.0, 0.99, None), "bounding_box": (0.06, 0.93, None), "triangle_locks": (0.16, 0.6, None),
@@ -85,7 +86,7 @@ def record(p: Plan, config: dict[str, Any], rng: np.random.Generator, drift: np.
     stages = {name: (samples * share).round(6).tolist() for name, share in zip(statistics_stages(), shares)}
     if config["kernel"] == "tile_parallel":
         stages["geometry"] = None  # fused: one named stage
-    bounds = statistics.order_interval(samples)
+    bounds = intervals.order_interval(samples)
     triangles, _, (w, h) = p.scenes[config["scene"]]
     imbalance = EFFECT.get(config["schedule"], 1.0)
     busy = [float(np.median(samples) * 0.76 * (imbalance if i == 0 else 1)) for i in range(config["threads"])]

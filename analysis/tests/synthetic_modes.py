@@ -9,6 +9,7 @@ from typing import Any, Callable
 
 import numpy as np
 
+from ..statistics import intervals
 from . import synthetic
 
 
@@ -96,7 +97,7 @@ def twin(entry: dict[str, Any], name: str, mode: Mode, hardness: float) -> dict[
     made["samples_ms"] = (np.array(entry["samples_ms"]) * scale).tolist()
     made["stages_ms"] = {stage: None if times is None else (np.array(times) * scale).tolist() for stage, times in entry["stages_ms"].items()}
     made["median_ms"] = float(np.median(made["samples_ms"])) if made["samples_ms"] else None
-    bounds = synthetic.statistics.order_interval(made["samples_ms"]) if made["samples_ms"] else None
+    bounds = intervals.order_interval(made["samples_ms"]) if made["samples_ms"] else None
     made["interval_ms"] = list(bounds) if bounds else None
     return made
 
