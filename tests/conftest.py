@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
-from .program import Parameters, read_dat, read_parameters, run, write_dat
+from .program import CPUS, Parameters, read_dat, read_parameters, run, sampling, sweep, write_dat
+
+if TYPE_CHECKING:
+    from .studies import Study
 
 
 @dataclass(frozen=True)
@@ -42,3 +46,39 @@ def crossing(tmp_path_factory: pytest.TempPathFactory) -> SmallScene:
     p = Parameters(camera=(0.5, 0.4, 0.8), height=61, width=97, theta=1.2, near=0.25, far=4.5)
     dat, txt = write_dat(folder / "crossing.dat", triangles), p.write(folder / "crossing.txt")
     return SmallScene(dat, txt, triangles.astype(float), p)
+
+
+@pytest.fixture(scope="session")
+def good(tmp_path_factory: pytest.TempPathFactory) -> Study:
+    """Only points that can run; 60 samples of each, so that there is a 95th percentile."""
+    from .studies import Study  # late: it asks the program what it can do, which not every test needs
+
+    return Study(tmp_path_factory.mktemp("good"), sampling(60),
+                 sweep(["tile_parallel", "triangle_atomics", "scanline"], ["serial", "openmp:dynamic,4", "tbb:auto"], threads=[1, min(2, CPUS)]),
+                 options=("--benchmark_context=a=b,site=here",))
+
+
+@pytest.fixture(scope="session")
+def mixed(tmp_path_factory: pytest.TempPathFactory) -> Study:
+    """Points that run, fail and are skipped, in several environments."""
+    from .studies import ISAS, Study
+
+    many = ["openmp:dynamic", "tbb:auto"]
+    return Study(tmp_path_factory.mktemp("mixed"), sampling(6, 8, point_seconds=5),
+                 sweep(["tile_parallel", "triangle_atomics"], "serial", numeric=["f32", "f64", "fixed_8"], fill=["closed", "top-left"]),
+                 sweep("all_pixels", "serial", scene="confetti:triangles=20000", size="1000x1000"),
+                 sweep("row_parallel", "openmp:static", threads=[1, CPUS + 1]),
+                 sweep("null", "serial"),
+                 sweep("row_parallel", many, threads=1, binding=["close", "spread"]),
+                 sweep("row_parallel", many, threads=1, wait_policy=["active", "passive"]),
+                 sweep("row_parallel", many, threads=1, runtime="libomp"),
+                 sweep("tile_parallel", "serial", near="off", tile=[16, 32]),
+                 sweep("scanline", "serial", cache=["warm", "cold"]),
+                 sweep("bounding_box", "serial", generality=["minimal", "full"]),
+                 sweep(["tile_parallel", "tile_simd"], "serial", numeric="fixed_8", isa=ISAS),
+                 sweep(["scanline", "fused_tiles"], "serial", numeric="fixed_8", techniques=["none", "huge_pages+fragments", "all-streaming", "all"]))
+
+
+@pytest.fixture(params=["good", "mixed"])
+def study(request: pytest.FixtureRequest) -> Study:
+    return request.getfixturevalue(request.param)

@@ -11,7 +11,8 @@ from typing import Any
 import pytest
 
 from .program import CPUS, ROOT, Outcome, events, read_png, records, refused, run, sampling, sweep, write_study
-from .test_study import CONFIG, RECORD, STAGES, obey
+from .studies import STAGES
+from .study_schema import CONFIG, RECORD, obey
 
 BOTH = [1, min(2, CPUS)]
 
