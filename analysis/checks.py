@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, Iterator
 
-from . import nodes, severity, text, weak
+from . import nodes, openmp_runtimes, severity, text, weak
 from .comparison import Analysis
 from .contexts import leaves
 from .load import Record, Study
@@ -48,7 +48,7 @@ def unhashed(study: Study) -> list[Record]:
 
 def check(analysis: Analysis) -> list[Warn]:
     """The grave ones first."""
-    found = [warn for rule in (_launches, _samples, _stops, _provenance, _nodes, _jobs, _load, _noise, _bases, _pinning, _placement, _steadiness, _threads, _floors,
+    found = [warn for rule in (_launches, _samples, _stops, _provenance, _nodes, _jobs, _load, _noise, _bases, _pinning, _placement, _steadiness, _threads, _runtimes, _floors,
                                _families, _agreement, _images) for warn in rule(analysis)]
     return sorted(found, key=lambda warn: warn.grade != GRAVE)
 
@@ -243,6 +243,17 @@ def _threads(analysis: Analysis) -> Iterator[Warn]:
         over = [r for r in analysis.study.timed if r.config.threads > len(allowed)]
         if over:
             yield Warn(NOTE, f"more threads than the {text.count(len(allowed), 'allowed CPU')} in {_some(over, analysis)}.")
+
+
+def _runtimes(analysis: Analysis) -> Iterator[Warn]:
+    study = analysis.study
+    wrong = [(r, said) for r in study.timed if (said := openmp_runtimes.other(study, r))]
+    if wrong:
+        yield Warn(severity.OTHER_RUNTIME, f"another OpenMP runtime than the one that was asked for ran {_some([r for r, _ in wrong], analysis)} (first:"
+                   f" {analysis.label(wrong[0][0])}: {wrong[0][1]}).")
+    for axis, names in openmp_runtimes.mixed(study).items():
+        yield Warn(severity.OTHER_RUNTIME, f"{text.listing(names)} ran points that all say runtime {axis}: they deal the same schedule differently, and"
+                   " nothing in these points' names tells them apart.")
 
 
 def _floors(analysis: Analysis) -> Iterator[Warn]:

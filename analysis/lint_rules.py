@@ -10,7 +10,7 @@ from typing import Any, Iterator
 import numpy as np
 from scipy import stats
 
-from . import checks, hypotheses, lint_figures, severity, steadiness, text, weak
+from . import checks, hypotheses, lint_figures, openmp_runtimes, severity, steadiness, text, weak
 from .lint import Finding, Folder, Rule
 from .load import Record
 from .raster_loop import busy
@@ -236,6 +236,15 @@ def set_up(folder: Folder) -> Iterator[Finding]:
             yield folder.record(record, severity.IDLE_THREAD, "a thread did next to nothing", "read its time as that of fewer threads")
 
 
+def runtime(folder: Folder) -> Iterator[Finding]:
+    for record in folder.study.timed:
+        if said := openmp_runtimes.other(folder.study, record):
+            yield folder.record(record, severity.OTHER_RUNTIME, said, "see that no LD_PRELOAD or library path puts another runtime in its place")
+    for axis, names in openmp_runtimes.mixed(folder.study).items():
+        yield Finding(severity.OTHER_RUNTIME, "records.jsonl", f"config.runtime {axis}", f"points of {text.listing(names)}",
+                      "make the runtime an axis of the study, or run all points in one environment")
+
+
 def noise(folder: Folder) -> Iterator[Finding]:
     machine = folder.study.context["machine"]
     load, cpus = checks.first_load(machine.get("load_average")), machine.get("cpus_online")
@@ -320,6 +329,7 @@ RULES = (
     Rule("order", "randomised blocks", order, "journal"),
     Rule("clock", "the timed region is named, and its parts fit into it", clock),
     Rule("set-up", "machine, build and where the threads ran are recorded", set_up),
+    Rule("runtime", "the OpenMP runtime that ran is the one that was asked for, and one name stands for one", runtime),
     Rule("noise", "load, steal, frequency, drift and outliers are labelled", noise),
     Rule("verification", "says what it was checked against", verification),
     Rule("verified-first", "checked before it was timed", verified_first, "journal"),

@@ -92,6 +92,7 @@ class Record:
     floor_ms: float | None = None  # absent in older records
     loop: np.ndarray | None = None  # the part of each raster stage in the loop under study, ms; absent in older records, and of peers
     origin: dict[str, Any] | None = None  # of merged studies: the node, its type, the job
+    runtime_observed: str | None = None  # the OpenMP runtime that ran; None: another backend, or an older record
 
     @property
     def ok(self) -> bool:
@@ -368,10 +369,11 @@ class _Reader:
         if recorded is not None and not (isinstance(recorded, list) and len(recorded) == 2 and all(map(is_number, recorded))):
             raise self.fail("interval_ms", "expected [low, high] or null")
         observed = value.get("threads_observed")
+        runtime = None if value.get("runtime_observed") is None else self.text(value, "runtime_observed")
         return Record(self.line, identity, name, config, status, reason, samples, stages, value.get("stop"), verify,
                       self.mapping("work"), observed if is_number(observed) else None, tuple(per_thread),
                       float(median) if is_number(median) else None, tuple(recorded) if recorded else None,
-                      value.get("context"), value, self.floor(), loop if samples else None, self.origin())
+                      value.get("context"), value, self.floor(), loop if samples else None, self.origin(), runtime)
 
     def origin(self) -> dict[str, Any] | None:
         origin = self.mapping("origin")

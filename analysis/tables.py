@@ -89,7 +89,7 @@ def points(analysis: Analysis, group: Group) -> Table:
         row: dict[str, Any] = {
             "scene": config.scene, "size": "x".join(map(str, config.size)), "numeric": config.numeric, "kernel": config.kernel,
             "backend": config.backend, "schedule": config.schedule, "chunk": config.chunk, "threads": config.threads,
-            **{axis: getattr(config, axis) for axis in EXTRA_AXES}, "runtime_observed": record.raw.get("runtime_observed"),
+            **{axis: getattr(config, axis) for axis in EXTRA_AXES}, "runtime_observed": record.runtime_observed,
             "status": record.status, "reason": record.reason, "id": record.id}
         said = {"kernel": config.kernel, "execution": analysis.execution(record), "threads": str(config.threads)}
         if record.ok:

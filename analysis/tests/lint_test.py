@@ -419,3 +419,71 @@ def test_bad_input(tmp_path, capsys):
     (directory / "journal.jsonl").write_text("{\n")
     assert program.main(["lint", str(directory)]) == 2
     assert "journal.jsonl:1" in capsys.readouterr().err
+
+
+def openmp(change):
+    """The change made to the first OpenMP point."""
+    return lambda records: change(next(entry for entry in records if entry["config"]["backend"] == "openmp"))
+
+
+def said_of_runtimes(directory):
+    """Findings of the rule, and what the report says of it."""
+    analysis = analyse(directory)
+    (verdict,) = [v for v in lint.lint(analysis).verdicts if v.rule.id == "runtime"]
+    return verdict.findings, [warn for warn in checks.check(analysis) if "untime" in warn.text]
+
+
+def test_another_runtime_than_was_asked_for(tmp_path):
+    directory = write(tmp_path / "a", openmp(lambda r: r.update(runtime_observed="libomp", config=r["config"] | {"runtime": "libgomp"})))
+    findings, warnings = said_of_runtimes(directory)
+    assert "libomp ran its loops, libgomp was asked for" in {f.problem for f in findings} and {f.severity for f in findings} == {"grave"}
+    assert any("1 of" in w.text and w.severity == checks.NOT_PUBLISHABLE for w in warnings)
+
+
+def test_the_programs_own_runtime_is_that_of_the_context(tmp_path):
+    """All points by LLVM's runtime (a preloaded one, say), where the program has gcc's: one runtime, but not its own."""
+    def edit(records):
+        for entry in records:
+            if entry["config"]["backend"] == "openmp":
+                entry["config"]["runtime"], entry["runtime_observed"] = "default", "libomp"
+
+    directory = write(tmp_path / "a", edit)
+    findings, warnings = said_of_runtimes(directory)
+    assert {f.problem for f in findings} == {"libomp ran its loops, libgomp, the program's own, was asked for"} and len(warnings) == 1
+    rewrite_context(directory, lambda context: context["libraries"].update(openmp="libomp 16"))
+    assert said_of_runtimes(directory) == ([], [])
+
+
+def test_one_name_stands_for_one_runtime(tmp_path):
+    def edit(records):
+        points = [entry for entry in records if entry["config"]["backend"] == "openmp"]
+        for entry in points:
+            entry["config"]["runtime"] = "default"
+        points[0]["runtime_observed"] = "libomp"
+
+    directory = write(tmp_path / "a", edit)
+    rewrite_context(directory, lambda context: context["libraries"].update(openmp="unavailable: not asked"))  # so that no point is wrong by itself
+    ((finding,), (warning,)) = said_of_runtimes(directory)
+    assert finding.place == "config.runtime default" and finding.problem == "points of libgomp and libomp"
+    assert "libgomp and libomp ran points that all say runtime default" in warning.text
+
+
+def test_runtimes_as_an_axis_are_no_mixture(tmp_path):
+    def edit(records):
+        openmp(lambda r: r.update(runtime_observed="libomp", config=r["config"] | {"runtime": "libomp"}))(records)
+
+    assert said_of_runtimes(write(tmp_path / "a", edit)) == ([], [])
+
+
+def test_older_records_say_nothing_of_runtimes(tmp_path):
+    def edit(records):
+        for entry in records:
+            entry.pop("runtime_observed")
+
+    assert said_of_runtimes(write(tmp_path / "a", edit)) == ([], [])
+
+
+def test_a_runtime_that_is_no_text_is_bad_input(tmp_path, capsys):
+    directory = write(tmp_path / "a", openmp(lambda r: r.update(runtime_observed=3)))
+    assert program.main(["lint", str(directory)]) == 2
+    assert "runtime_observed" in capsys.readouterr().err

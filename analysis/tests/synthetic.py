@@ -104,7 +104,7 @@ def record(p: Plan, config: dict[str, Any], rng: np.random.Generator, drift: np.
         "work": {"triangles": triangles, "drawn": triangles - 300, "pieces": 12, "rejected": {
             "non_finite": 0, "zero_area": 100, "behind_near": 0, "beyond_far": 0, "off_screen": 200, "back_facing": 0},
             "near_clipped": 0, "guard_clipped": 0, "covered_pixels": w * h // 3, "bytes": 12 * w * h},
-        "threads_observed": config["threads"],
+        "threads_observed": config["threads"], "runtime_observed": "libgomp" if config["backend"] == "openmp" else None,
         "per_thread": [{"busy_ms": b, "iterations": 100, "cpu": i, "cpus": {str(i): n}, "migrations": 0} for i, b in enumerate(busy)],
         "placement": {"binding": None if config["backend"] == "serial" else "kept", "migrations": 0, "cpus": config["threads"], "cores": config["threads"],
                       "packages": 1, "numa_nodes": 1, "samples_sharing_cpu": 0, "samples_sharing_core": 0},
