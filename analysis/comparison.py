@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Collection
+from typing import Any, Callable, Collection, TypeVar
 
 from . import nodes, steadiness, text
 from .load import Config, Record, Study
@@ -20,6 +20,7 @@ GROUP_AXES = ("scene", "scene_hash", "size", "numeric", "fill", "near", "output"
 EXTRA_AXES = ("isa", "tile", "binding", "wait_policy", "runtime", "generality", "techniques")
 PEER_AXES = ("scene", "scene_hash", "size")  # what a peer shares with the groups that it is shown beside
 BASE_AXES = ("scene", "scene_hash", "size", "numeric", "fill", "near", "isa", "output", "cache")
+T = TypeVar("T")
 
 
 @dataclass(eq=False)
@@ -102,6 +103,15 @@ class Analysis:
         self.serial_base = {record.id: self._find_serial_base(record) for record in study.timed}
         self.thread_base = {record.id: self._find_thread_base(record) for record in study.timed}
         self._ratios: dict[tuple[str, str], Estimate] = {}
+        self._made: dict[tuple, Any] = {}
+
+    def once(self, make: Callable[..., T], *arguments: Any) -> T:
+        """What make(self, *arguments) returns, computed the first time only: figures, tables, findings and lint show the same
+        numbers, and bootstraps take long. Nobody may change what is returned."""
+        key = (make, *arguments)
+        if key not in self._made:
+            self._made[key] = make(self, *arguments)
+        return self._made[key]
 
     # names
 

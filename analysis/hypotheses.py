@@ -56,6 +56,10 @@ class Verdict:
 
 def verdicts(analysis: Analysis) -> list[Verdict]:
     """In the order of the study."""
+    return analysis.once(_verdicts)
+
+
+def _verdicts(analysis: Analysis) -> list[Verdict]:
     known = {record.name: record for record in analysis.study.every_record}
     found = []
     stated = analysis.study.hypotheses

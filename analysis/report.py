@@ -12,7 +12,7 @@ import jinja2
 import matplotlib
 from markupsafe import Markup
 
-from . import (__version__, checks, figures, findings, hypotheses, ladder, lint, lost_time, nodes, sidecars, stage_efficiency, strategy_map, style, tables, text,
+from . import (__version__, checks, figures, findings, hypotheses, inline_svg, ladder, lint, lost_time, nodes, sidecars, stage_efficiency, strategy_map, style, tables, text,
                trade, trade_tables, trade_text, weak, work, writing)
 from .captions import Caption
 from .comparison import Analysis
@@ -28,7 +28,7 @@ MANY_SMALL = 6  # groups of few points; the tables of more are in tables/ only
 class Embedded:
     name: str
     number: int
-    uri: str
+    picture: Markup  # <svg>, or <img> of a figure that is made of pixels
     caption: Caption
 
 
@@ -43,19 +43,19 @@ def write(analysis: Analysis, out: Path | None = None) -> Written:
     directory = analysis.study.directory
     files: dict[str, bytes] = {}
     sections: dict[str, list[Embedded]] = {}
+    page = inline_svg.Page()
     with matplotlib.rc_context(style.RC):
         for number, drawing in enumerate(figures.draw(analysis), start=1):
             made = sidecars.files(drawing, analysis.study.records_hash)
             files |= made
-            kind, suffix = ("image/png", "png") if drawing.raster else ("image/svg+xml", "svg")
-            uri = data_uri(kind, made[f"{drawing.name}.{suffix}"])
-            sections.setdefault(drawing.section, []).append(Embedded(drawing.name, number, uri, drawing.caption))
+            picture = image(made[f"{drawing.name}.png"], drawing.caption.title) if drawing.raster else page.figure(drawing.figure, drawing.caption.title)
+            sections.setdefault(drawing.section, []).append(Embedded(drawing.name, number, picture, drawing.caption))
     found = [t for module in (hypotheses, nodes, tables, trade_tables, ladder, strategy_map, work, weak, stage_efficiency, lost_time) for t in module.tables(analysis)]
     for table in found:
         if table.section:
             sections.setdefault(table.section, [])  # a section may have tables and no figure
     top = findings.top(analysis)
-    html = render(analysis, sections, found, top, lint.lint(analysis, files))
+    html = render(analysis, page, sections, found, top, lint.lint(analysis, files))
     path = out if out is not None else directory / "report.html"
     captions = "".join(f"Figure {e.number} ({e.name}): {e.caption.plain}\n\n" for es in sections.values() for e in es)
     writing.refuse_inputs([path], [directory / name for name in ("records.jsonl", "context.json", "journal.jsonl")])
@@ -65,18 +65,18 @@ def write(analysis: Analysis, out: Path | None = None) -> Written:
     return Written(path, top)
 
 
-def data_uri(kind: str, content: bytes) -> str:
-    return f"data:{kind};base64,{base64.b64encode(content).decode('ascii')}"
+def image(png: bytes, name: str) -> Markup:
+    return Markup('<img src="data:image/png;base64,{}" alt="{}">').format(base64.b64encode(png).decode("ascii"), name)
 
 
-def render(analysis: Analysis, sections: dict[str, list[Embedded]], found: list[Table], top: list[Finding],
+def render(analysis: Analysis, page: inline_svg.Page, sections: dict[str, list[Embedded]], found: list[Table], top: list[Finding],
            rules: lint.Result) -> str:
     environment = jinja2.Environment(loader=jinja2.FileSystemLoader(Path(__file__).parent), autoescape=True,
                                      undefined=jinja2.StrictUndefined, trim_blocks=False)
     study, hidden = analysis.study, small_tables(analysis)
     about = study.context["study"]
     return environment.get_template("report.html.j2").render(
-        title=study.name, question=about.get("question") or "", findings=top, warnings=checks.check(analysis),
+        page=page, title=study.name, question=about.get("question") or "", findings=top, warnings=checks.check(analysis),
         rules=rules, rules_summary=lint.summary(rules), merged=lint.merged,
         counts=counts(analysis), run_facts=run_facts(analysis), machine_facts=machine_facts(study.context),
         placed_tables=placed(found, hidden), hidden=len(hidden), section_words={trade.SECTION: trade_text.summary(analysis)},

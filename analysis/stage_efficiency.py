@@ -52,6 +52,11 @@ def stage_samples(record: Record, stage: str) -> Samples | None:
 
 
 def efficiencies(analysis: Analysis, group: Group) -> list[Efficiency]:
+    """Of every point on several threads that has a base."""
+    return analysis.once(_efficiencies, group)
+
+
+def _efficiencies(analysis: Analysis, group: Group) -> list[Efficiency]:
     found = []
     for record in group.timed:
         if record.config.threads == 1 or not record.stages or (base := base_of(analysis, record)) is None or not base.stages:

@@ -9,7 +9,7 @@ from functools import lru_cache
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
-from matplotlib.textpath import TextPath
+from matplotlib.textpath import text_to_path
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
 FULL_WIDTH = 6.9  # inches: the text width of an A4 page
@@ -67,10 +67,10 @@ def text_width(texts: list[str], size: float, bold: bool = False) -> float:
     return max((_width(t, size, bold) for t in candidates if t.strip()), default=0.0) / 72
 
 
-@lru_cache(maxsize=None)  # the same names stand in many panels, and outlines are slow to measure
+@lru_cache(maxsize=None)  # the same names stand in many panels, and each page of them
 def _width(words: str, size: float, bold: bool) -> float:
-    font = FontProperties(family="DejaVu Sans", weight="bold" if bold else "normal")
-    return float(TextPath((0, 0), words, size=size, prop=font).get_extents().width)
+    font = FontProperties(family="DejaVu Sans", weight="bold" if bold else "normal", size=size)
+    return float(text_to_path.get_text_width_height_descent(words, font, ismath=False)[0])
 
 
 def title(figure: Figure, words: str, top: float = 0.13) -> None:

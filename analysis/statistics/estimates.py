@@ -45,7 +45,7 @@ def median_estimate(samples: Samples) -> Estimate:
     """The median; with enough launches its interval lets the launches vary too."""
     value = float(np.median(samples.values))
     if samples.launch_count >= MIN_LAUNCHES:
-        low, high = quantiles(resampled_medians(samples.by_launch()))
+        low, high = quantiles(resampled_medians(samples.by_launch))
         return Estimate(value, low, high, samples.n, "bootstrap over launches, then blocks")
     bounds = order_interval(samples.values)
     if bounds is None:
@@ -75,8 +75,8 @@ def ratio(numerator: Samples, denominator: Samples) -> Estimate:
     note = "unpaired: blocks do not match"
     if smaller < MIN_SAMPLES:
         return Estimate(value, None, None, smaller, "none", "fewer than 6 samples")
-    above = resampled_medians(numerator.by_launch())
-    below = resampled_medians(denominator.by_launch(), SEED + 1)
+    above = resampled_medians(numerator.by_launch)
+    below = resampled_medians(denominator.by_launch, SEED + 1)
     low, high = quantiles(above / below)
     return Estimate(value, low, high, smaller, "unpaired bootstrap", note)
 
@@ -101,8 +101,8 @@ def ratio_of_sums(numerators: Sequence[Samples], denominators: Sequence[Samples]
     if n < MIN_SAMPLES:
         return Estimate(above / below, None, None, n, "none", "fewer than 6 samples")
     # Distinct seeds: points are resampled independently of each other.
-    top = sum(resampled_medians(s.by_launch(), SEED + 2 * i) for i, s in enumerate(numerators))
-    bottom = sum(resampled_medians(s.by_launch(), SEED + 2 * i + 1) for i, s in enumerate(denominators))
+    top = sum(resampled_medians(s.by_launch, SEED + 2 * i) for i, s in enumerate(numerators))
+    bottom = sum(resampled_medians(s.by_launch, SEED + 2 * i + 1) for i, s in enumerate(denominators))
     low, high = quantiles(top / bottom)
     return Estimate(above / below, low, high, n, "unpaired bootstrap")
 

@@ -70,4 +70,4 @@ def launch_log_ratios(numerator: Samples, denominator: Samples) -> dict[int, flo
 
 def launch_medians(samples: Samples) -> np.ndarray:
     """The logarithm of each launch's median: what repeats independently in a run."""
-    return np.log([np.median(group) for group in samples.by_launch()])
+    return np.log([np.median(group) for group in samples.by_launch])

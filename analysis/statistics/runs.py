@@ -28,7 +28,7 @@ def between_runs(samples: Samples, base: Samples, family: float = 1) -> tuple[Es
     n = min(samples.n, base.n)
     if n < MIN_SAMPLES:
         return Estimate(value, None, None, n, "none", f"fewer than {MIN_SAMPLES} samples"), 1.0, "none"
-    above, below = resampled_medians(samples.by_launch()), resampled_medians(base.by_launch(), SEED + 1)
+    above, below = resampled_medians(samples.by_launch), resampled_medians(base.by_launch, SEED + 1)
     low, high = quantiles(above / below)
     p, test = unpaired_test(samples.values, base.values, family)
     if min(samples.launch_count, base.launch_count) < 2:

@@ -61,8 +61,9 @@ def prints_three(capsys, directory, *more) -> list[str]:
 def test_report_is_self_contained(full):
     directory, _, written = full
     page, links = parse(written.path)
-    assert links.found and all(link.startswith("data:image/") for link in links.found)
-    assert "script" not in links.tags and "link" not in links.tags and "@import" not in page and "url(" not in page
+    assert links.found and all(link.startswith(("data:image/", "#")) for link in links.found)
+    assert {link[1:] for link in links.found if link.startswith("#")} <= set(re.findall(r' id="([^"]+)"', page))
+    assert "script" not in links.tags and "link" not in links.tags and "@import" not in page and not re.search(r"url\((?!#)", page)
     assert 'name="viewport"' in page and "@media print" in page and page.startswith("<!DOCTYPE html>")
     assert "<b>not html</b>" not in page and "&lt;b&gt;not html" in page
 
