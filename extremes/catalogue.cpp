@@ -8,9 +8,8 @@
 #include <limits>
 #include <set>
 
-#include "base/error.h"
+#include "base/table_reader.h"
 #include "extremes/constructions.h"
-#include "extremes/toml_reader.h"
 #include "numeric/modes.h"
 
 namespace rasterbench::extremes {
@@ -21,8 +20,8 @@ constexpr std::int64_t kMostPixels = std::int64_t{kMaxImageSide} * kMaxImageSide
 /// Numbers of a corner list: each finite value has to fit a float32.
 std::vector<std::array<double, 9>> read_triangles(TableReader& reader, const std::string& key) {
   std::vector<std::array<double, 9>> triangles;
-  reader.each(key, [&](const toml::node& node) {
-    const std::vector<double> row = reader.row(node, key, 9);
+  reader.each_element(key, [&](const toml::node& node) {
+    const std::vector<double> row = reader.exact_numbers(node, key, 9);
     std::array<double, 9> corners{};
     std::copy(row.begin(), row.end(), corners.begin());
     for (const double v : row)
@@ -35,7 +34,7 @@ std::vector<std::array<double, 9>> read_triangles(TableReader& reader, const std
 
 Construction read_construction(TableReader& reader) {
   Construction construct;
-  construct.name = reader.text("name");
+  reader.text("name", construct.name);
   const ConstructionKind* kind = nullptr;
   try {
     kind = &find_construction(construct.name);
@@ -43,7 +42,8 @@ Construction read_construction(TableReader& reader) {
     reader.fail("name", error.what());
   }
   for (const GeneratorKey& key : kind->keys) {
-    const double value = reader.number(key.name, key.default_value);
+    double value = key.default_value;
+    reader.exact_number(key.name, value);
     if (!(value >= key.minimum && value <= key.maximum) || (key.integer && value != std::floor(value)))
       reader.fail(key.name, fmt::format("{} is not a {} from {:g} to {:g}", value,
                                         key.integer ? "whole number" : "number", key.minimum, key.maximum));
@@ -56,16 +56,16 @@ CaseInput read_input(TableReader& reader) {
   CaseInput input;
   input.world = read_triangles(reader, "world");
   input.screen = read_triangles(reader, "screen");
-  input.generator = reader.text("generator");
-  input.parameter_file = reader.text("parameter_file");
+  reader.text("generator", input.generator);
+  reader.text("parameter_file", input.parameter_file);
   reader.table("construct", "construct", [&](TableReader& r) { input.construct = read_construction(r); });
   reader.table("model_file", "model_file", [&](TableReader& r) {
     constexpr std::int64_t kMost = 1000;  // what a test may write to a disk
-    input.model_file = {
-        .claimed = static_cast<std::int32_t>(r.integer("claimed", 0, std::numeric_limits<std::int32_t>::min(),
-                                                       std::numeric_limits<std::int32_t>::max())),
-        .triangles = r.integer("triangles", 0, 0, kMost),
-        .extra_bytes = r.integer("extra_bytes", 0, 0, kMost)};
+    ModelFile& file = input.model_file.emplace();
+    r.integer("claimed", std::numeric_limits<std::int32_t>::min(), std::numeric_limits<std::int32_t>::max(),
+              file.claimed);
+    r.integer("triangles", 0, kMost, file.triangles);
+    r.integer("extra_bytes", 0, kMost, file.extra_bytes);
   });
   const int given = !input.world.empty() + !input.screen.empty() + !input.generator.empty() +
                     !input.parameter_file.empty() + input.construct.has_value() +
@@ -80,7 +80,7 @@ CaseInput read_input(TableReader& reader) {
 void read_parameters(TableReader& reader, const CaseInput& input, SceneParameters& p) {
   p.width = p.height = 64;
   if (const toml::node* node = reader.find("size")) {
-    const auto size = reader.row(*node, "size", 2);
+    const auto size = reader.exact_numbers(*node, "size", 2);
     for (const double side : size)
       if (!(side >= 1 && side <= kMaxImageSide) || side != std::floor(side))
         reader.fail(*node, "size", fmt::format("must be two whole numbers from 1 to {}", kMaxImageSide));
@@ -95,12 +95,12 @@ void read_parameters(TableReader& reader, const CaseInput& input, SceneParameter
   p.near_plane = 0.5;
   p.far_plane = 20;
   if (const toml::node* node = reader.find("camera")) {
-    const auto camera = reader.row(*node, "camera", 3);
+    const auto camera = reader.exact_numbers(*node, "camera", 3);
     p.camera = {camera[0], camera[1], camera[2]};
   }
-  p.theta = reader.number("theta", p.theta);
-  p.near_plane = reader.number("near", p.near_plane);
-  p.far_plane = reader.number("far", p.far_plane);
+  reader.exact_number("theta", p.theta);
+  reader.exact_number("near", p.near_plane);
+  reader.exact_number("far", p.far_plane);
 }
 
 std::string read_mode(const TableReader& reader, const toml::node& node, const std::string& key,
@@ -119,7 +119,7 @@ void check_known(const TableReader& reader, const toml::node& node, const std::s
 
 void read_judges(TableReader& reader, Must& must) {
   static const std::vector<std::string> kJudges{"oracle", "truth", "rays"};
-  reader.each("match", [&](const toml::node& node) {
+  reader.each_element("match", [&](const toml::node& node) {
     const std::string word = node.value_or(std::string());
     check_known(reader, node, "match", word, kJudges);
     (word == "oracle" ? must.match_oracle : word == "truth" ? must.match_truth : must.match_rays) = true;
@@ -129,38 +129,43 @@ void read_judges(TableReader& reader, Must& must) {
 Must read_must(TableReader& reader, const CaseInput& input, const SceneParameters& p) {
   Must must;
   read_judges(reader, must);
-  must.equal = reader.flag("equal");
-  if (reader.find("pixels")) must.pixels = reader.integer("pixels", 0, 0, kMostPixels);
-  for (const auto& row : reader.rows("owners", 3)) {
+  reader.boolean("equal", must.equal);
+  if (const toml::node* node = reader.find("pixels"))
+    must.pixels = reader.integer_of(*node, "pixels", 0, kMostPixels);
+  reader.each_element("owners", [&](const toml::node& node) {
+    const std::vector<double> row = reader.exact_numbers(node, "owners", 3);
     const ExpectedPixel pixel{static_cast<int>(row[0]), static_cast<int>(row[1]),
                               static_cast<std::int32_t>(row[2])};
     if (pixel.x < 0 || pixel.x >= p.width || pixel.y < 0 || pixel.y >= p.height)
       reader.fail("owners", fmt::format("pixel {},{} is not in the image", pixel.x, pixel.y));
     must.owners.push_back(pixel);
-  }
+  });
   reader.table("counts", "counts", [&](TableReader& r) {
     for (const char* name : {"non_finite", "zero_area", "behind_near", "beyond_far", "off_screen"})
-      if (r.find(name)) must.counts[name] = r.integer(name, 0, 0, kMaxTriangles);
+      if (const toml::node* node = r.find(name))
+        must.counts[name] = r.integer_of(*node, name, 0, kMaxTriangles);
   });
-  must.nothing_tested = reader.flag("nothing_tested");
+  reader.boolean("nothing_tested", must.nothing_tested);
   reader.table("same_as", "same_as", [&](TableReader& r) {
-    Change change{.name = r.text("change")};
-    if (!r.find("change")) r.fail("change", "is missing");
-    check_known(r, *r.find("change"), "change", change.name, change_names());
+    Change change;
+    r.text("change", change.name);
+    const toml::node* node = r.find("change");
+    if (!node) r.fail("change", "is missing");
+    check_known(r, *node, "change", change.name, change_names());
     if (needs_screen_scene(change.name) && !is_on_screen(input))
       r.fail("change", change.name + " needs triangles that are given on the screen");
     if (change.name == "shifted") {
-      change.x = static_cast<double>(r.integer("x", 0, -kMaxImageSide, kMaxImageSide));
-      change.y = static_cast<double>(r.integer("y", 0, -kMaxImageSide, kMaxImageSide));
+      r.integer("x", -kMaxImageSide, kMaxImageSide, change.x);
+      r.integer("y", -kMaxImageSide, kMaxImageSide, change.y);
     }
-    if (change.name == "scaled") change.factor = r.number("factor", 1);
+    if (change.name == "scaled") r.exact_number("factor", change.factor);
     must.same_as = change;
   });
-  must.every_execution = reader.flag("every_execution");
-  must.no_background_inside = reader.flag("no_background_inside");
+  reader.boolean("every_execution", must.every_execution);
+  reader.boolean("no_background_inside", must.no_background_inside);
   const auto read_modes = [&](const std::string& key) {
     std::vector<std::string> modes;
-    reader.each(key, [&](const toml::node& node) {
+    reader.each_element(key, [&](const toml::node& node) {
       modes.push_back(read_mode(reader, node, key, node.value_or(std::string())));
     });
     return modes;
@@ -172,9 +177,9 @@ Must read_must(TableReader& reader, const CaseInput& input, const SceneParameter
       must.wrong_at_most[read_mode(r, node, name, name)] = r.integer_of(node, name, 0, kMostPixels);
     });
   });
-  must.error = reader.strings("error");
-  must.warning = reader.strings("warning");
-  must.refusal_or_room = reader.strings("refusal_or_room");
+  reader.string_list("error", must.error);
+  reader.string_list("warning", must.warning);
+  reader.string_list("refusal_or_room", must.refusal_or_room);
   return must;
 }
 
@@ -201,15 +206,15 @@ void check_must(const TableReader& reader, const Case& one) {
 Case read_case(const toml::table& table, const std::string& file) {
   TableReader reader(table, file);
   Case one;
-  one.number = static_cast<int>(reader.integer("number", 0, 1, 999));
-  one.name = reader.text("name");
+  reader.integer("number", 1, 999, one.number);
+  reader.text("name", one.name);
   if (one.number == 0) reader.fail("number", "is missing from this [[case]]");
   if (one.name.empty()) reader.fail("name", "is missing from this [[case]]");
-  one.what = reader.text("what");
+  reader.text("what", one.what);
   one.input = read_input(reader);
   read_parameters(reader, one.input, one.parameters);
   static const std::vector<std::string> kFills{"closed", "top-left"}, kNears{"clip", "off"};
-  reader.each("fill", [&](const toml::node& node) {
+  reader.each_element("fill", [&](const toml::node& node) {
     const std::string word = node.value_or(std::string());
     check_known(reader, node, "fill", word, kFills);
     one.fills.push_back(word == "closed" ? FillRule::kClosed : FillRule::kTopLeft);
@@ -230,17 +235,11 @@ Case read_case(const toml::table& table, const std::string& file) {
 }  // namespace
 
 std::vector<Case> read_catalogue(std::string_view text, const std::string& file) {
-  toml::table table;
-  try {
-    table = toml::parse(text, file);
-  } catch (const toml::parse_error& error) {
-    throw InputError({.file = file, .line = static_cast<std::int64_t>(error.source().begin.line)},
-                     std::string(error.description()));
-  }
+  const toml::table table = parse_toml(text, file);
   TableReader reader(table, file);
   std::vector<Case> cases;
   std::set<std::string> names;
-  reader.each("case", [&](const toml::node& node) {
+  reader.each_element("case", [&](const toml::node& node) {
     if (!node.is_table()) reader.fail(node, "case", "must be written [[case]]");
     cases.push_back(read_case(*node.as_table(), file));
     if (!names.insert(cases.back().name).second)

@@ -7,7 +7,7 @@
 #include <map>
 #include <set>
 
-#include "harness/table_reader.h"
+#include "base/table_reader.h"
 #include "kernels/kernel.h"
 
 namespace rasterbench {

@@ -8,7 +8,7 @@
 
 #include "base/error.h"
 #include "base/suggest.h"
-#include "harness/table_reader.h"
+#include "base/table_reader.h"
 #include "harness/weak.h"
 #include "kernels/kernel.h"
 
