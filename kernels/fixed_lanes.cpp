@@ -172,8 +172,8 @@ HWY_INLINE void draw_vector(const Loaded& loaded, const LaneBoxes& boxes, FillRu
   }
 }
 
-void draw_small(const LaneTriangles& in, const std::uint32_t* indices, std::int64_t n, const PixelBox& bounds,
-                const LaneTarget& out) {
+void draw_small(const BoxedTriangles& in, const std::uint32_t* indices, std::int64_t n,
+                const PixelBox& bounds, const LaneTarget& out) {
   const auto lanes = static_cast<std::int64_t>(hn::Lanes(kFloats));
   Loaded loaded;
   LaneBoxes boxes;
@@ -228,8 +228,8 @@ void draw_large(const Fixed8::Prepared& triangle, const PixelBox& box, const Lan
   }
 }
 
-void draw_small(const LaneTriangles& in, const std::uint32_t* indices, std::int64_t n, const PixelBox& bounds,
-                const LaneTarget& out) {
+void draw_small(const BoxedTriangles& in, const std::uint32_t* indices, std::int64_t n,
+                const PixelBox& bounds, const LaneTarget& out) {
   for (std::int64_t i = 0; i < n; ++i) {
     const ScreenTriangle<float>& triangle = in.triangles[indices[i]];
     const auto prepared =

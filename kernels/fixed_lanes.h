@@ -18,7 +18,7 @@ struct LaneTarget {
 };
 
 /// Triangles of a frame, and the boxes of pixels in which they are drawn.
-struct LaneTriangles {
+struct BoxedTriangles {
   const ScreenTriangle<float>* triangles;
   const PixelBox* boxes;
   FillRule fill;
@@ -39,8 +39,8 @@ struct FixedLanes {
   /// is below 0. For i < n.
   void (*boxes)(const ScreenTriangle<float>* triangles, std::int64_t n, PixelBox* boxes);
   /// Draws the triangles in.triangles[indices[i]], i < n, whose boxes are small, within `bounds`.
-  void (*small)(const LaneTriangles& in, const std::uint32_t* indices, std::int64_t n, const PixelBox& bounds,
-                const LaneTarget& out);
+  void (*small)(const BoxedTriangles& in, const std::uint32_t* indices, std::int64_t n,
+                const PixelBox& bounds, const LaneTarget& out);
   /// Draws one triangle of any size in `box`, which lies within its own.
   void (*large)(const Fixed8::Prepared& triangle, const PixelBox& box, const LaneTarget& out);
 };

@@ -35,8 +35,8 @@ struct TileSimd {
           },
           [&](std::int64_t i) { return boxes_[static_cast<std::size_t>(i)]; });
       small_.resize(static_cast<std::size_t>(execution.threads()));
-      const LaneTriangles triangles{in.triangles.data(), boxes_.data(), in.settings.fill, in.settings.tie,
-                                    in.triangle_count};
+      const BoxedTriangles triangles{in.triangles.data(), boxes_.data(), in.settings.fill, in.settings.tie,
+                                     in.triangle_count};
       execution.loop(lists_.cells(), [&](std::int64_t tile, int worker) {
         const PixelBox bounds = lists_.box(tile);
         const LaneTarget target{out.keys.data(), out.width};
@@ -78,7 +78,7 @@ struct TileSimd {
       std::uint32_t indices[kBatch];
       std::size_t size = 0;
 
-      void draw(const FixedLanes& lanes, const LaneTriangles& in, const PixelBox& bounds,
+      void draw(const FixedLanes& lanes, const BoxedTriangles& in, const PixelBox& bounds,
                 const LaneTarget& out) {
         if (size > 0) lanes.small(in, indices, static_cast<std::int64_t>(size), bounds, out);
         size = 0;

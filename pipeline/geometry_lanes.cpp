@@ -31,13 +31,13 @@ struct LaneCorner {
   Vector x, y, z, w, near_distance;
 };
 
-/// The corners of a vector of triangles. Their coordinates lie 9 floats apart: taken apart as triples of
-/// coordinates, then as triples of corners, since gathers cost more than all the arithmetic on some CPUs.
-struct LaneTriangles {
+/// A triangle in each lane, by its corners. In memory coordinates lie 9 floats apart: taken apart as triples
+/// of coordinates, then as triples of corners, since gathers cost more than all the arithmetic on some CPUs.
+struct LaneTriangle {
   LanePoint corners[3];
 };
 
-HWY_INLINE LaneTriangles load_triangles(const Triangle* triangles) {
+HWY_INLINE LaneTriangle load_triangles(const Triangle* triangles) {
   static_assert(sizeof(Triangle) == 9 * sizeof(float));
   constexpr std::size_t kLanes = hn::MaxLanes(kFloats);
   const float* from = &triangles->a.x;
@@ -169,7 +169,7 @@ HWY_INLINE std::uint64_t transform_vector(const Triangle* triangles, std::int32_
                                           const ScreenTransform& t, const GeometryOptions& options,
                                           Slots* slots, std::int64_t first_slot, GeometryCounts& counts) {
   const SceneNeeds& needs = options.needs;
-  const LaneTriangles loaded = load_triangles(triangles);
+  const LaneTriangle loaded = load_triangles(triangles);
   const LanePoint &a = loaded.corners[0], &b = loaded.corners[1], &c = loaded.corners[2];
   Lanes lanes;
   if (needs.finite_test)
