@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Iterable
 
 import matplotlib
 import numpy as np
@@ -56,6 +56,7 @@ class Cell:
     samples: Samples | None  # None: no speed, for `reason`
     reason: str
     judged: dict[str, Any] | None  # what the judge said of its picture
+    runtime: str | None  # of OpenMP, as its loops ran under; None where they ran under none
 
     @property
     def marked(self) -> bool:
@@ -164,12 +165,14 @@ class Comparison:
         return {(point.name, c.name): self._cell(point, c) for point in self.points for c in self.configurations}
 
     def _cell(self, point: Record, configuration: Configuration) -> Cell:
+        record = None if configuration.reason else next((r for r in self.studies[configuration.name].records if r.name == point.name), None)
+
         def cell(samples: Samples | None, reason: str, judged: dict[str, Any] | None = None) -> Cell:
-            return Cell(configuration, point.config, point.name, samples, reason, judged)
+            runtime = None if record is None or samples is None else record.raw.get("runtime_observed")
+            return Cell(configuration, point.config, point.name, samples, reason, judged, runtime)
 
         if configuration.reason:
             return cell(None, configuration.reason)
-        record = next((r for r in self.studies[configuration.name].records if r.name == point.name), None)
         if record is None:
             return cell(None, "missing: this program's study does not have the point")
         judged = self._judged[configuration.name].get(point.name)
@@ -197,6 +200,17 @@ class Comparison:
     def machine(self) -> str:
         return text.machine(self.base_study.context["machine"])
 
+    def runtimes(self, cells: Iterable[Cell]) -> str:
+        """Where compilers bring OpenMP runtimes of their own, a sentence that says so; else nothing."""
+        under: dict[str, list[str]] = {}
+        for cell in cells:
+            if cell.runtime is not None and cell.configuration.name not in under.setdefault(cell.runtime, []):
+                under[cell.runtime].append(cell.configuration.name)
+        if len(under) < 2:
+            return ""
+        said = "; ".join(f"{runtime}: {', '.join(names)}" for runtime, names in sorted(under.items()))
+        return f"OpenMP's loops ran under the compiler's own runtime ({said}): between these, only serial points compare the compilers alone."
+
     @cached_property
     def rounds(self) -> list[int]:
         """Of each timed cell."""
@@ -219,7 +233,8 @@ def table(found: Comparison) -> Table:
             judged = cell.judged or {}
             accuracy = {key: judged.get(key) for key in ("differing_pixels", "wrong", "unexplained", "end_to_end_errors", "max_depth_error_steps")}
             numbers.append({"scene": config.scene, "size": "x".join(map(str, config.size)), "kernel": config.kernel, "numeric": config.numeric,
-                            "execution": execution(config), "threads": config.threads, "configuration": configuration.name,
+                            "execution": execution(config), "threads": config.threads, "openmp_runtime": cell.runtime,
+                            "configuration": configuration.name,
                             "compiler": configuration.compiler or None, "flags": configuration.flags or None,
                             "program_bytes": configuration.program_bytes}
                            | columns("median_ms", spent) | columns("time_over_base", over)
@@ -236,7 +251,8 @@ def table(found: Comparison) -> Table:
     note = (f"{scenes}. Base: {found.base}, paired by round; above 1 is slower. Conforms: the picture has the bits of the specification as"
             f" {found.judge} draws it. Wrong: pixels whose triangle is not the exact oracle's; beyond bound: those that the mode's bound does"
             " not explain. Depth error: the largest over right pixels, in steps of 2^-24. Programs compiled with -ffast-math promise no"
-            " bits: their times are shown and marked, those of any other program that does not conform are not.")
+            " bits: their times are shown and marked, those of any other program that does not conform are not."
+            f" {found.runtimes(found.cells.values())}").rstrip()
     return Table("compilers", "The same source under several compilers and flags", note, pd.DataFrame(numbers).convert_dtypes(), pd.DataFrame(words))
 
 

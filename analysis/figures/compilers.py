@@ -130,6 +130,7 @@ def _caption(found: Comparison, cells: list[Cell], title: str) -> Caption:
     marked = sorted({cell.configuration.name for cell in timed if cell.marked})
     if marked:
         body.append(f"Hollow: {text.listing(marked)} promises no bits; its wrong pixels and depth errors are in the table.")
+    body += [found.runtimes(cells)] if found.runtimes(cells) else []
     body.append(f"All other programs that are shown drew the bits of the specification, judged by {found.judge}. Machine: {found.machine}.")
     facts = Facts("medians of paired ratios", kind, base, (min(samples), max(samples)) if samples else None,
                   (min(rounds), max(rounds)) if rounds else None, found.machine)

@@ -43,6 +43,8 @@ def folder_of(path: Path, rounds: int = ROUNDS, judged: dict[str, dict[str, Any]
             record |= {"samples_ms": times.tolist(), "launches": np.repeat(np.arange(rounds), BLOCKS).tolist(), "blocks": list(range(rounds * BLOCKS)),
                        "stages_ms": {"raster": times.tolist()}, "median_ms": float(np.median(times)), "interval_ms": None, "p95_ms": None,
                        "min_ms": float(times.min()), "max_ms": float(times.max())}
+            if record["config"]["backend"] == "openmp":
+                record["runtime_observed"] = "libomp" if name.startswith("clang") else "libgomp"
             if fast:
                 record["verify"] = {"conforms": None, "differing_pixels": None, "oracle": None, "checked_against": "nothing"}
             changed.append(record)
@@ -125,6 +127,19 @@ def test_what_is_not_installed_stands_in_the_table_with_its_reason(folder: Path)
     found = compilers.Comparison(folder)
     assert cell(found, "clang-O3").reason == "skipped: clang++ is not installed"
     assert "skipped: clang++ is not installed" in compilers.plain(found)
+
+
+def test_runtimes_that_differ_with_the_compiler_are_named(folder: Path) -> None:
+    """libomp's loops are not libgomp's: such a ratio is of two things."""
+    found = compilers.Comparison(folder)
+    said = found.runtimes(found.cells.values())
+    assert "libgomp: gcc-O0, gcc-O2, gcc-Ofast; libomp: clang-O2" in said
+    made = compilers.table(found)
+    assert made.note.endswith(said) and set(made.numbers["openmp_runtime"].dropna()) == {"libgomp", "libomp"}
+    assert made.numbers[made.numbers["execution"] == "serial"]["openmp_runtime"].isna().all()
+    compilers.write(found)
+    assert said in (folder / "compilers_ratio.txt").read_text()
+    assert found.runtimes(cell for cell in found.cells.values() if cell.configuration.name != "clang-O2") == ""
 
 
 def test_what_is_written(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
