@@ -151,6 +151,16 @@ def test_what_does_not_build_stands_in_the_table(study: Path, tmp_path: Path) ->
     assert reason.startswith("failed: does not build (") and "clang-O1/build.log" in reason
 
 
+def test_the_reason_is_the_first_error_and_not_a_file_of_that_name(tmp_path: Path) -> None:
+    fake = tmp_path / "fake"
+    fake.mkdir()
+    (fake / "cmake").write_text("#!/bin/sh\n[ \"$1\" = --build ] || exit 0\n"
+                                "echo '[1/2] Building CXX object base/error.cpp.o'; echo 'a.cpp:3:1: error: no such luck'; exit 1\n")
+    (fake / "cmake").chmod(0o755)
+    done = compilers("--configurations", "gcc-O1", "--build-only", script=checkout(tmp_path / "checkout"), PATH=f"{fake}:{os.environ['PATH']}")
+    assert done.returncode == 1 and done.stdout.endswith("build.log): a.cpp:3:1: error: no such luck\n"), done.stdout
+
+
 @pytest.mark.parametrize("arguments, words", [
     (["--bogus"], ["--bogus"]),
     (["--rounds", "0"], ["--rounds", "0"]),
