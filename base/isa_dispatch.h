@@ -11,6 +11,8 @@
 
 namespace rasterbench {
 
+static_assert(HWY_STATIC_TARGET == HWY_SCALAR, "the baseline is one lane: link rasterbench_highway");
+
 /// Highway's bit for an instruction set; 0 for kBaseline, which is no code of Highway's.
 constexpr std::int64_t highway_target(Isa isa) {
   switch (isa) {

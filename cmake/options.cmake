@@ -35,11 +35,17 @@ function(rasterbench_library name)
   target_link_libraries(${name} PUBLIC rasterbench_options rasterbench_native)
 endfunction()
 
+# Highway's targets are those of the axis of instruction sets, whatever the compiler, its flags and the version of Highway. Without
+# this the baseline would not be one lane but an emulated vector under clang and newer versions of GCC, or SSE2 in later Highways.
+add_library(rasterbench_highway INTERFACE)
+target_link_libraries(rasterbench_highway INTERFACE PkgConfig::hwy)
+target_compile_definitions(rasterbench_highway INTERFACE
+  HWY_BROKEN_EMU128=1 HWY_BASELINE_TARGETS=HWY_SCALAR "HWY_DISABLED_TARGETS=~(HWY_SCALAR|HWY_SSE4|HWY_AVX2|HWY_AVX3)")
+
 # rasterbench_lanes(FOLDER sources...): sources that Highway compiles for each instruction set, as objects of FOLDER.
 function(rasterbench_lanes folder)
   add_library(${folder}_lanes OBJECT ${ARGN})
-  target_link_libraries(${folder}_lanes PUBLIC rasterbench_options PkgConfig::hwy)
-  target_compile_definitions(${folder}_lanes PRIVATE HWY_DISABLED_TARGETS=HWY_SSSE3)  # no instruction set of the axis
+  target_link_libraries(${folder}_lanes PUBLIC rasterbench_options rasterbench_highway)
   target_sources(${folder} PUBLIC $<TARGET_OBJECTS:${folder}_lanes>)
 endfunction()
 
