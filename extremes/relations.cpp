@@ -106,7 +106,7 @@ Finding judge_executions(const DrawnCase& drawn, const Picture& specification) {
       finding.worsen(Verdict::kWrong, fmt::format("{} pixels differ with {}", differing, how));
   };
   const RendererSetup plain{nullptr, drawn.base.settings, {}};
-  for (const std::uint64_t seed : {1, 2, 3}) {
+  for (const std::uint64_t seed : {1u, 2u, 3u}) {
     RendererSetup setup = plain;
     setup.permutation_seed = seed;
     check(setup, "the screen triangles permuted");

@@ -30,7 +30,9 @@ namespace rasterbench {
 namespace {
 
 /// log2 of the side of the tiles: that of `tile` rounded down to a power of two from 8 to 128.
-int tile_shift(int tile) { return std::bit_width(static_cast<unsigned>(std::clamp(tile, 8, 128))) - 1; }
+int tile_shift(int tile) {
+  return static_cast<int>(std::bit_width(static_cast<unsigned>(std::clamp(tile, 8, 128)))) - 1;
+}
 
 constexpr KernelInfo kInfo{
     .name = "fused_tiles",
