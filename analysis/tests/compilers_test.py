@@ -41,7 +41,7 @@ def folder_of(path: Path, rounds: int = ROUNDS, judged: dict[str, dict[str, Any]
             record = json.loads(line)
             times = known[name] * 10 * np.repeat(DRIFT[:rounds], BLOCKS) * np.exp(rng.normal(0, 0.01, rounds * BLOCKS))
             record |= {"samples_ms": times.tolist(), "launches": np.repeat(np.arange(rounds), BLOCKS).tolist(), "blocks": list(range(rounds * BLOCKS)),
-                       "stages_ms": {"raster": times.tolist()}, "median_ms": float(np.median(times)), "interval_ms": None, "p95_ms": None,
+                       "stages_ms": {"raster": times.tolist()}, "loop_ms": None, "median_ms": float(np.median(times)), "interval_ms": None, "p95_ms": None,
                        "min_ms": float(times.min()), "max_ms": float(times.max())}
             if record["config"]["backend"] == "openmp":
                 record["runtime_observed"] = "libomp" if name.startswith("clang") else "libgomp"

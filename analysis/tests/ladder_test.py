@@ -36,7 +36,7 @@ def of(steps: list[tuple[str, str, str | None, float]], floor: float | None = 2.
             samples = milliseconds * drift
             entry |= {"id": f"{i:032x}", "name": f"{kernel}/{isa}/{techniques}", "samples_ms": samples.tolist(),
                       "median_ms": float(np.median(samples)), "interval_ms": None, "floor_ms": floor,
-                      "stages_ms": {"raster": samples.tolist()}, "min_ms": float(samples.min()), "max_ms": float(samples.max())}
+                      "stages_ms": {"raster": samples.tolist()}, "loop_ms": None, "min_ms": float(samples.min()), "max_ms": float(samples.max())}
             records.append(entry)
     return edit
 

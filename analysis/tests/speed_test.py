@@ -26,7 +26,7 @@ def timed(entry: dict[str, Any], samples: np.ndarray) -> None:
     bounds = intervals.order_interval(samples)
     entry.update(samples_ms=samples.tolist(), launches=[0] * len(samples), blocks=list(range(len(samples))),
                  median_ms=float(np.median(samples)), interval_ms=list(bounds) if bounds else None, min_ms=float(samples.min()),
-                 max_ms=float(samples.max()), stages_ms={"raster": samples.tolist()})
+                 max_ms=float(samples.max()), stages_ms={"raster": samples.tolist()}, loop_ms=None)
 
 
 def identify(entry: dict[str, Any]) -> dict[str, Any]:

@@ -50,6 +50,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
             times = 10 * factor * drift * np.exp(rng.normal(0, 0.002, SAMPLES))
             value["samples_ms"] = times.tolist()
             value["stages_ms"] = {stage: (times / 4).tolist() for stage in value["stages_ms"]}
+            value["loop_ms"] = None
             value |= {"median_ms": float(np.median(times)), "interval_ms": None, "min_ms": float(times.min()), "max_ms": float(times.max()),
                       "p95_ms": None}
 
