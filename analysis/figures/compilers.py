@@ -129,7 +129,8 @@ def _caption(found: Comparison, cells: list[Cell], title: str) -> Caption:
             f" {text.span(rounds)} rounds of one launch of each program in random order, {text.span(samples)} samples a point.", base]
     marked = sorted({cell.configuration.name for cell in timed if cell.marked})
     if marked:
-        body.append(f"Hollow: {text.listing(marked)} promises no bits; its wrong pixels and depth errors are in the table.")
+        verb, whose = ("promises", "its") if len(marked) == 1 else ("promise", "their")
+        body.append(f"Hollow: {text.listing(marked)} {verb} no bits; {whose} wrong pixels and depth errors are in the table.")
     body += [found.runtimes(cells)] if found.runtimes(cells) else []
     body.append(f"All other programs that are shown drew the bits of the specification, judged by {found.judge}. Machine: {found.machine}.")
     facts = Facts("medians of paired ratios", kind, base, (min(samples), max(samples)) if samples else None,
