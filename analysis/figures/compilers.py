@@ -78,9 +78,7 @@ def _panel(axes: Axes, found: Comparison, points: list[str], configs: dict[str, 
                 shown.append((y, executions.index(where(configs[point])), cell, over))
             elif cell.samples is None:
                 missing = cell.reason
-        if configuration.name == found.base:
-            axes.annotate("base", (1, y), xytext=(4, 0), textcoords="offset points", fontsize=7, va="center", color=style.GREY)
-        elif missing and not any(row == y for row, *_ in shown):
+        if missing and configuration.name != found.base and not any(row == y for row, *_ in shown):
             width = axes.get_position().width * style.FULL_WIDTH
             axes.text(0.02, y, text.shorten(missing, max(8, int(width / 0.058))), transform=axes.get_yaxis_transform(), fontsize=7, style="italic",
                       color=style.FAILED, va="center", clip_on=True)
@@ -93,6 +91,12 @@ def _panel(axes: Axes, found: Comparison, points: list[str], configs: dict[str, 
         style.number_axis(axes, low, high, False)
         room = 0.08 * max(high - low, 0.05)
         axes.set_xlim(low - room, high + room)
+    names = [c.name for c in rows]
+    if found.base in names:
+        across, _ = axes.transAxes.inverted().transform(axes.transData.transform((1, 0)))
+        side = -1 if across > 0.7 else 1  # of the line, so that the word stays within the panel
+        axes.annotate("base", (1, names.index(found.base)), xytext=(4 * side, 0), textcoords="offset points", fontsize=7, va="center",
+                      ha="right" if side < 0 else "left", color=style.GREY)
     axes.set_yticks(range(len(rows)), [c.name for c in rows] if labelled else [])
     axes.tick_params(axis="y", length=0)
     axes.grid(axis="x")
