@@ -61,9 +61,10 @@ def place(figure: Figure, left: float, bottom: float, width: float, height: floa
 
 
 def text_width(texts: list[str], size: float, bold: bool = False) -> float:
-    """Width in inches of the widest text."""
-    widest = max(texts, key=len, default="")
-    candidates = {t for t in texts if len(t) > 0.8 * len(widest)}
+    """Width in inches of the widest line."""
+    lines = [line for words in texts for line in words.split("\n")]
+    widest = max(lines, key=len, default="")
+    candidates = {line for line in lines if len(line) > 0.8 * len(widest)}
     return max((_width(t, size, bold) for t in candidates if t.strip()), default=0.0) / 72
 
 
@@ -103,7 +104,7 @@ def number_axis(axes: Axes, low: float, high: float, log: bool, name: str = "x")
         axis.set_minor_formatter(NullFormatter())
     else:
         limits(0, high * HEADROOM)
-        axis.set_major_locator(MaxNLocator(6))
+        axis.set_major_locator(MaxNLocator(6, steps=(1, 2, 2.5, 5, 10)))  # 1 is a tick where it is in sight: the base of ratios
     axis.set_major_formatter(FuncFormatter(plain))
 
 

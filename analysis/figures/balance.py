@@ -52,7 +52,7 @@ def _draw(analysis: Analysis, group: Group, threads: int) -> Iterator[Drawing]:
     for page, chosen in enumerate(split):
         frame = row_frame(chosen, f"{group.title}, {text.count(threads, 'thread')}{part(page, len(split))}",
                           "busy time of a thread in the raster stage / mean over the threads (times)",
-                          limits=(0, max(highest, 1.2)), log=False, keys=keys)
+                          limits=(0, max(highest, 1.2)), log=False, keys=keys, every=blocks)
         kernels = [block.kernel for block in chosen for _ in block.rows]
         shown = []
         for (y, row), kernel in zip(frame.rows, kernels):

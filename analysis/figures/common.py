@@ -16,6 +16,7 @@ from ..load import Record
 from . import floors
 
 ROW_HEIGHT = 0.175  # inches
+SERIES_HEIGHT = 0.055  # of a row of several intervals that overlap
 MAX_ROWS = 44  # more rows go to a further figure
 LABEL_SIZE = 7.5
 SMALL = 6  # a group with fewer timed points has no figures of its own if it can be drawn beside its like
@@ -60,6 +61,11 @@ class Block:
         return self.kernel + (" (continued)" if self.continued else "")
 
 
+def most_rows(row_height: float) -> int:
+    """Rows of this height that a page holds, with a title, an axis and two lines of keys."""
+    return min(MAX_ROWS, int((style.MAX_HEIGHT - 1.2) / row_height))
+
+
 def pages(blocks: list[Block], limit: int = MAX_ROWS) -> list[list[Block]]:
     """Blocks in as few figures as hold them, about equally filled; a block longer than a figure is divided."""
     pieces = []
@@ -96,18 +102,20 @@ class Frame:
 
 
 def row_frame(blocks: list[Block], title: str, unit: str, *, limits: tuple[float, float], log: bool,
-              keys: list) -> Frame:
+              keys: list, every: list[Block] | None = None, row_height: float = ROW_HEIGHT) -> Frame:
+    """every: the blocks of all pages, so that their axes begin and end at the same places."""
     rows = sum(len(block.rows) + 1 for block in blocks)
-    labels = [row.label for block in blocks for row in block.rows]
-    heads = [block.title for block in blocks]
+    measured = blocks if every is None else [*every, *blocks]
+    labels = [row.label for block in measured for row in block.rows]
+    heads = [block.title for block in measured]
     left = 0.25 + max(style.text_width(labels, LABEL_SIZE) + 0.1, style.text_width(heads, LABEL_SIZE, bold=True))
-    notes = [row.note for block in blocks for row in block.rows if row.note]
+    notes = [row.note for block in measured for row in block.rows if row.note]
     right = 0.15 + (style.text_width(notes, 7) + 0.08 if notes else 0.0)
     columns = style.legend_columns([key.get_label() for key in keys])
     foot = 0.5 + (0.17 * -(-len(keys) // columns) if keys else 0)
-    wide, height = style.FULL_WIDTH - left - right, rows * ROW_HEIGHT + 0.35 + foot
+    wide, height = style.FULL_WIDTH - left - right, rows * row_height + 0.35 + foot
     figure = style.new_figure(style.FULL_WIDTH, height)
-    axes = style.place(figure, left, foot, wide, rows * ROW_HEIGHT)
+    axes = style.place(figure, left, foot, wide, rows * row_height)
     axes.set_ylim(rows - 0.5, -0.5)
     axes.set_yticks([])
     style.number_axis(axes, *limits, log)
@@ -125,7 +133,7 @@ def row_frame(blocks: list[Block], title: str, unit: str, *, limits: tuple[float
             placed.append((y, row))
             _label(axes, y, row.label, 0.07, color=style.FAILED if row.message else "black", ha="right")
             if row.message:
-                axes.text(0.01, y, text.shorten(row.message, int(wide / 0.058)), transform=axes.get_yaxis_transform(),
+                axes.text(0.01, y, text.shorten(row.message, int(wide / 0.05)), transform=axes.get_yaxis_transform(),
                           fontsize=7, style="italic", color=style.FAILED, va="center", clip_on=True)
             if row.note:
                 axes.annotate(row.note, (1, y), xycoords=("axes fraction", "data"), xytext=(4, 0),
@@ -138,13 +146,14 @@ def row_frame(blocks: list[Block], title: str, unit: str, *, limits: tuple[float
 
 
 def dots(blocks: list[Block], series: list[str], title: str, unit: str, *, limits: tuple[float, float], log: bool,
-         ring: str = "", reference: float | None = None, reference_name: str = "", floor: dict[int, float] | None = None) -> Figure:
-    """Horizontal dot plot with intervals; floor: where the line of a series stands."""
+         ring: str = "", reference: float | None = None, reference_name: str = "", floor: dict[int, float] | None = None,
+         floor_unit: str = "ms", every: list[Block] | None = None, row_height: float = ROW_HEIGHT) -> Figure:
+    """Horizontal dot plot with intervals; floor: where the line of a series stands; every, row_height: of row_frame()."""
     keys = _keys(series, ring, reference, reference_name)
     if floor:
         limits, floor, far = floors.reached(limits, log, floor)
-        keys.append(floors.key(far))
-    frame = row_frame(blocks, title, unit, limits=limits, log=log, keys=keys)
+        keys.append(floors.key(far, floor_unit))
+    frame = row_frame(blocks, title, unit, limits=limits, log=log, keys=keys, every=every, row_height=row_height)
     for y, row in frame.rows:
         _points(frame.axes, row, y, len(series))
     if reference is not None:
@@ -163,7 +172,7 @@ def _points(axes, row: Row, y: float, series: int) -> None:
     for point in row.points:
         look = style.look(point.series)
         # Points of one row are set apart a little: at equal times all of them stay visible.
-        at = y + (point.series - (series - 1) / 2) * min(0.14, 0.6 / max(1, series))
+        at = y + (point.series - (series - 1) / 2) * min(0.14, 0.75 / max(1, series))
         if point.low is not None:
             axes.plot([point.low, point.high], [at, at], color=look.colour, lw=1.4, solid_capstyle="butt", zorder=3)
             axes.plot([point.low, point.high], [at, at], color=look.colour, lw=0, marker="|", ms=5, mew=1.0, zorder=3)

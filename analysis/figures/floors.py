@@ -46,9 +46,9 @@ def beside(records: list[Record], fastest: dict[str, float]) -> tuple[str, list[
         f" at the measured bandwidth; the fastest cells take it {times}."]
 
 
-def key(far: list[float] | None = None) -> Line2D:
-    """far: lines that are named because they are too far from the points to be drawn."""
-    return Line2D([], [], color=style.GREY, lw=0.9, ls=DOTTED, label=LABEL + (f"; off the axis at {span(far)}" if far else ""))
+def key(far: list[float] | None = None, unit: str = "") -> Line2D:
+    """far: lines that are named, in this unit, because they are too far from the points to be drawn."""
+    return Line2D([], [], color=style.GREY, lw=0.9, ls=DOTTED, label=LABEL + (f"; off the axis at {span(far)} {unit}" if far else ""))
 
 
 def span(values: list[float]) -> str:
@@ -88,4 +88,4 @@ def over_threads(axes: Axes, lines: list[dict[int, float]], colours: list[str]) 
     near = [value for value in values if value <= REACH * top]
     axes.set_ylim(0, max([top, *(style.HEADROOM * value for value in near)]))
     if len(near) < len(values):
-        axes.text(0.03, 0.985, f"floor at {span(values)}", transform=axes.transAxes, fontsize=6.5, color=style.GREY, va="top")
+        axes.text(0.03, 0.985, f"floor at {span(values)} times", transform=axes.transAxes, fontsize=6.5, color=style.GREY, va="top")

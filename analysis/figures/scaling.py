@@ -239,7 +239,7 @@ def _over_serial(analysis: Analysis, group: Group) -> Iterator[Drawing]:
         figure = dots(chosen, [f"{n} thread{'s' if n > 1 else ''}" for n in threads], group.title + part(page, len(split)),
                       "speedup over the fastest serial kernel (times)" + (", log scale" if log else ""),
                       limits=(min(low, 1), max(high, 1)), log=log, reference=1.0, reference_name="as fast as the base",
-                      floor={threads.index(count): ceiling for count, ceiling in limits.items()})
+                      floor={threads.index(count): ceiling for count, ceiling in limits.items()}, floor_unit="times", every=blocks)
         caption = captions.build(
             analysis, f"Speedup over the fastest serial kernel, {group.title}{part(page, len(split))}",
             "Right of the dashed line a point is faster than the best serial kernel.", based,

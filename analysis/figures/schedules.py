@@ -18,6 +18,7 @@ SECTION = "Schedules and chunks"
 CELL_HEIGHT = 0.23  # inches
 PALEST_RANGE = 1.5  # a few per cent must not look like a factor
 DARKEST = 4.0  # slower than four times the best needs no further shades
+DARK = 0.6  # from this shade on white stands out more than black (equal contrast at a luminance of 0.18)
 # One hue from white to dark: it survives grey paper and every kind of colour vision.
 SHADES = LinearSegmentedColormap.from_list("slower", ["#FFFFFF", "#BBD7EA", "#5E9DC8", "#0F4F82", "#06284A"])
 
@@ -44,10 +45,11 @@ def _draw(analysis: Analysis, group: Group, panels: list[Panel], threads: int) -
         figure = _figure(analysis, group, chosen, rows, chunks, across, threads, part(page, len(split)), floor)
         caption = captions.build(
             analysis, f"Schedule and chunk, {group.title}, {text.count(threads, 'thread')}{part(page, len(split))}",
-            "Look for pale cells: shades give the time relative to the fastest cell of the same panel, numbers the time.",
+            "Look for pale cells: shades give the time relative to the fastest cell of the same panel, numbers the time. The ratio is the median of"
+            " ratios within a block, so where times vary a cell may be paler than its number suggests.",
             shown, estimates=None,
             notes=[f"Cells are median times of a frame in ms ({analysis.sampled(shown)}); 'default' leaves the chunk to the"
-                   " runtime. The thick frame is the fastest cell of a panel, thin frames cannot be told apart from it (rank"
+                   " runtime. The thick frame is the fastest cell of a panel, dashed frames cannot be told apart from it (rank"
                    f" test, Holm-corrected within the panel and for all {len(analysis.panels)} panels, and paired interval). Other thread counts are in the"
                    " table of all points.", *floor_notes])
         yield Drawing(named(f"schedules_{group.slug}", page, len(split)), SECTION, figure, caption)
@@ -114,6 +116,6 @@ def _panel(analysis: Analysis, axes: Axes, panel: Panel, rows: list[str], chunks
         best, near = comparison.verdict == "best", comparison.verdict in ("same", "ambiguous")
         if best or near:
             axes.add_patch(Rectangle((x - 0.44, y - 0.41), 0.88, 0.82, facecolor="none", lw=1.8 if best else 0.8,
-                                     edgecolor="black" if shade < 0.6 else "white", ls="-" if best else "--", zorder=3))
+                                     edgecolor="black" if shade < DARK else "white", ls="-" if best else "--", zorder=3))
         axes.text(x, y, text.number(analysis.estimates[record.id].value), fontsize=6.5, ha="center", va="center",
-                  color="black" if shade < 0.45 else "white", weight="bold" if best else "normal", zorder=4)
+                  color="black" if shade < DARK else "white", weight="bold" if best else "normal", zorder=4)

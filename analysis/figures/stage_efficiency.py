@@ -8,7 +8,7 @@ from .. import captions, stage_efficiency, text
 from ..comparison import Analysis, Group
 from ..load import STAGES
 from ..stage_efficiency import TOTAL, Efficiency
-from .common import Block, Drawing, Row, bounds, dots, drawn_together, named, pages, part
+from .common import ROW_HEIGHT, SERIES_HEIGHT, Block, Drawing, Row, bounds, dots, drawn_together, most_rows, named, pages, part
 from .times import point
 
 MOST = 30  # rows; with more, only the fastest execution of each kernel and backend
@@ -51,12 +51,14 @@ def _draw(analysis: Analysis, group: Group) -> Iterator[Drawing]:
     threads = found[0].record.config.threads
     every = [p for block in blocks for row in block.rows for p in row.points]
     _, high = bounds(every)
-    split = pages(blocks)
+    row_height = max(ROW_HEIGHT, SERIES_HEIGHT * len(series))
+    split = pages(blocks, most_rows(row_height))
     shown = [one.record for one in found]
     kinds = sorted({e.kind for one in found for e in one.stages.values() if e.has_interval})
     for page, some in enumerate(split):
         figure = dots(some, [_series(s) for s in series], f"{group.title}, {text.count(threads, 'thread')}" + part(page, len(split)),
-                      "parallel efficiency, T(1) / (N T(N))", limits=(0, max(high, 1)), log=False, reference=1.0, reference_name="ideal")
+                      "parallel efficiency, T(1) / (N T(N))", limits=(0, max(high, 1)), log=False, reference=1.0, reference_name="ideal", every=blocks,
+                      row_height=row_height)
         notes = [f"{text.count(sum(one.over_serial for one in found), 'point')} without a point on one thread have the serial backend as"
                  " their base."] if any(one.over_serial for one in found) else []
         if not complete:

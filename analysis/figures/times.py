@@ -49,7 +49,7 @@ def _draw(analysis: Analysis, group: Group) -> Iterator[Drawing]:
         # All pages of a scene share one axis, so that they can be laid side by side.
         figure = dots(chosen, [f"{n} thread{'s' if n > 1 else ''}" for n in threads], group.title + part(page, len(split)),
                       "time of a frame, median (ms)" + (", log scale" if log else ""), limits=bounds(every), log=log,
-                      ring="fastest, or not distinguishable from it", floor=floor_lines(group.timed, threads))
+                      ring="fastest, or not distinguishable from it", floor=floor_lines(group.timed, threads), every=blocks)
         caption = captions.build(
             analysis, f"Time per strategy, {group.title}{part(page, len(split))}",
             "Left is faster. Where two intervals are apart the points differ; rings mark the fastest and what cannot be told"
@@ -69,9 +69,9 @@ def near_best(group: Group, record: Record) -> bool:
 def _notes(analysis: Analysis, group: Group) -> list[str]:
     notes = ["An interval that is narrower than its marker is hidden by it."]
     if len(group.timed) > 1:
-        scenes = len([g for g in analysis.groups if g.timed])
+        groups = len([g for g in analysis.groups if g.timed])
         notes.append(f"Told apart means: rank test, corrected for {text.count(len(group.timed) - 1, 'comparison')} (Holm)"
-                     + (f" on each of {scenes} scenes" if scenes > 1 else "")
+                     + (f" in each of {groups} groups of equal picture and arithmetic" if groups > 1 else "")
                      + ", below 0.05, and the paired interval of the ratio above 1.")
     if group.peers:
         notes.append("A peer is another program that draws the same scene, with an arithmetic and a fill rule of its own: no kernel, and"

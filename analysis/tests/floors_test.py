@@ -91,7 +91,7 @@ def test_points_keep_their_room(study):
             assert [a.get_ylim() for a in drawing.figure.axes] == [a.get_ylim() for a in plain.figure.axes]
             assert [a.get_xlim() for a in drawing.figure.axes] == [a.get_xlim() for a in plain.figure.axes]
             named = [words.get_text() for axes in drawing.figure.axes for words in axes.texts] + labels(drawing)
-            assert any("floor at" in words or "off the axis at" in words for words in named)
+            assert any(("floor at" in words or "off the axis at" in words) and words.endswith((" ms", " times")) for words in named)
 
 
 def test_an_axis_reaches_for_near_lines_only():
