@@ -325,7 +325,7 @@ def cautions(model: Model) -> list[str]:
         lines.append(f"{dispatch}, where nobody contends for the next chunk: on more threads it costs several times that, so small chunks look better than"
                      " they are. Trace with --threads as many as there are CPUs.")
     else:
-        lines.append(f"{dispatch}; with more, more contend for the next chunk.")
+        lines.append(f"{dispatch}, of oneTBB on one, whose ranges are its own until they are stolen; with more, more contend for OpenMP's next chunk.")
     if costs.block > 1:
         lines.append(f"Each {costs.block} consecutive iterations share one traced cost: smaller chunks look more even than they are.")
     if model.steal is None:

@@ -109,32 +109,52 @@ std::vector<Joined> join(const std::vector<TracedChunk>& chunks, std::int64_t to
   return joined;
 }
 
+constexpr int kRepetitions = 9;
+
 /// A loop with an empty body: the shortest of several, since other load only lengthens it.
 struct EmptyLoop {
   double seconds = std::numeric_limits<double>::infinity();
   double chunks = 0;
 };
 
-/// Empty where no repetition counts. oneTBB may leave a worker out, which is then no loop of so many threads;
-/// OpenMP's threads take part in every one, if only in its barrier.
-std::optional<EmptyLoop> time_empty_loop(Execution& execution, std::int64_t n) {
-  constexpr int kRepetitions = 9;
-  std::optional<EmptyLoop> shortest;
+EmptyLoop time_empty_loop(Execution& execution, std::int64_t n) {
+  EmptyLoop shortest;
   for (int repetition = 0; repetition < kRepetitions; ++repetition) {
     execution.reset_tally();
     const double begin = LoopTrace::now();
     execution.loop(n, [](std::int64_t, int) {});
     const double seconds = LoopTrace::now() - begin;
     double chunks = 0;
-    bool has_idle = false;
-    for (const WorkerTally& tally : execution.tally()) {
-      chunks += static_cast<double>(tally.chunks);
-      has_idle = has_idle || tally.chunks == 0;
-    }
-    if (execution.config().backend == "tbb" && has_idle) continue;
-    if (!shortest || seconds < shortest->seconds) shortest = {seconds, chunks};
+    for (const WorkerTally& tally : execution.tally()) chunks += static_cast<double>(tally.chunks);
+    if (seconds < shortest.seconds) shortest = {seconds, chunks};
   }
   return shortest;
+}
+
+/// Seconds that oneTBB takes beyond one iteration for a loop of one a thread, the shortest of several. The
+/// iterations are long enough for its workers to come; a repetition that left one out does not count, and
+/// where few others are left nothing is known.
+std::optional<double> time_tbb_start(Execution& execution) {
+  constexpr double kIteration = 1e-4;
+  const std::int64_t chunk = execution.config().chunk.value_or(1);
+  constexpr int kLeastRepetitions = 3;
+  int counted = 0;
+  double shortest = std::numeric_limits<double>::infinity();
+  for (int repetition = 0; repetition < kRepetitions; ++repetition) {
+    execution.reset_tally();
+    const double begin = LoopTrace::now();
+    execution.loop(execution.threads() * chunk, [&](std::int64_t i, int) {
+      const double started = LoopTrace::now();
+      while (i % chunk == 0 && LoopTrace::now() - started < kIteration) {
+      }
+    });
+    const double seconds = LoopTrace::now() - begin - kIteration;
+    const auto is_idle = [](const WorkerTally& tally) { return tally.chunks == 0; };
+    if (std::any_of(execution.tally().begin(), execution.tally().end(), is_idle)) continue;
+    shortest = std::min(seconds, shortest);
+    ++counted;
+  }
+  return counted < kLeastRepetitions ? std::nullopt : std::optional(shortest);
 }
 
 /// Chunks of a loop: by the rule of the OpenMP runtime where it is known, else as they were seen.
@@ -143,22 +163,18 @@ double chunks_of(const ExecutionConfig& config, std::int64_t n, const EmptyLoop&
   return borders.empty() ? seen.chunks : static_cast<double>(borders.size() - 1);
 }
 
-/// One round of measuring a schedule; fields are empty where the loop did not run on all threads.
+/// One round of measuring a schedule.
 struct EmptyLoops {
-  std::optional<double> start, further;  // seconds of the short loop, and of the long one beyond it
-  double chunks = 0;                     // of the long one beyond the short one
+  double start, further;  // seconds of the short loop, and of the long one beyond it
+  double chunks;          // of the long one beyond the short one
 };
 
 EmptyLoops time_empty_loops(Execution& execution, std::int64_t n) {
   const ExecutionConfig& config = execution.config();
   const std::int64_t least = std::int64_t{config.threads} * config.chunk.value_or(1);
-  const auto start = time_empty_loop(execution, least), whole = time_empty_loop(execution, n);
-  EmptyLoops loops;
-  if (start) loops.start = start->seconds;
-  if (!start || !whole) return loops;
-  loops.further = whole->seconds - start->seconds;
-  loops.chunks = chunks_of(config, n, *whole) - chunks_of(config, least, *start);
-  return loops;
+  const EmptyLoop start = time_empty_loop(execution, least), whole = time_empty_loop(execution, n);
+  return {start.seconds, whole.seconds - start.seconds,
+          chunks_of(config, n, whole) - chunks_of(config, least, start)};
 }
 
 }  // namespace
@@ -314,25 +330,31 @@ std::map<std::string, ScheduleCost> measure_schedules(int threads) {
   std::map<std::string, ScheduleCost> costs;
   for (const Schedule& schedule : schedules()) {
     if (schedule.backend == "serial") continue;
+    // oneTBB leaves the ranges of a loop to the thread that split them. Another one steals, which is no
+    // hand-out, and an empty loop is over before it comes: what a range costs is told by one thread.
+    const bool is_tbb = schedule.backend == "tbb";
+    const int handed = is_tbb ? 1 : threads;
     // The same loop with one chunk a thread: what the iterations themselves cost.
-    const auto even = make_execution({schedule.backend, "static", {}, threads, nullptr});
+    const auto even = make_execution({schedule.backend, "static", {}, handed, nullptr});
     for (const std::optional<int> chunk :
          {std::optional<int>(), std::optional<int>(1), std::optional<int>(16)}) {
       if (chunk && schedule.chunk.empty()) continue;
-      const ExecutionConfig config{schedule.backend, schedule.name, chunk, threads, nullptr};
+      const ExecutionConfig config{schedule.backend, schedule.name, chunk, handed, nullptr};
       const auto execution = make_execution(config);
       ScheduleCost& cost = costs[to_string(config)];
+      if (is_tbb)
+        cost.start_seconds =
+            time_tbb_start(*make_execution({schedule.backend, schedule.name, chunk, threads, nullptr}));
       std::vector<double> rounds;  // seconds of a chunk
       for (int round = 0; round < kMostRounds && !cost.chunk_seconds; ++round) {
         const EmptyLoops of_even = time_empty_loops(*even, kIterations),
                          own = time_empty_loops(*execution, kIterations);
-        if (own.start) cost.start_seconds = std::min(*own.start, cost.start_seconds.value_or(*own.start));
-        if (!of_even.further || !own.further) continue;
+        if (!is_tbb) cost.start_seconds = std::min(own.start, cost.start_seconds.value_or(own.start));
         if (own.chunks <= 0) {
           cost.chunk_seconds = 0;  // more iterations make no more chunks
           break;
         }
-        rounds.push_back(threads * (*own.further - *of_even.further) / own.chunks);
+        rounds.push_back(handed * (own.further - of_even.further) / own.chunks);
         cost.chunk_seconds = beyond_noise(rounds);
       }
     }

@@ -70,11 +70,12 @@ LoopCosts measure_loop_costs(const Point& point, const Scene& scene, int frames)
 
 /// What a schedule costs in a loop whose iterations do nothing.
 struct ScheduleCost {
-  /// Of a loop with one chunk for each thread: to start it and to wait for all. Empty where the runtime never
-  /// used all threads.
+  /// Of a loop with one chunk for each thread: to start it and to wait for all. Empty where oneTBB never
+  /// used all threads, or seldom.
   std::optional<double> start_seconds;
-  /// That a thread spends on a further chunk, while all others do the same: beyond what the iterations take
-  /// under the backend's static schedule. 0 where more iterations do not make more chunks, so that all their
+  /// That a thread spends on a further chunk beyond what the iterations take under the backend's static
+  /// schedule: of OpenMP while all others do the same, of oneTBB on its own, since its threads take from each
+  /// other by stealing only. 0 where more iterations do not make more chunks, so that all their
   /// cost is in start_seconds; empty where it is not several times the noise.
   std::optional<double> chunk_seconds;
 };

@@ -136,11 +136,17 @@ TEST(ScheduleCosts, AreOfEveryScheduleWithThreads) {
        {"openmp:static", "openmp:static,1", "openmp:dynamic,1", "openmp:guided,16", "openmp:auto"})
     ASSERT_TRUE(costs.contains(schedule)) << schedule;
   EXPECT_GT(costs.at("openmp:dynamic,1").chunk_seconds.value_or(1), 0);  // empty on a noisy machine
+  if (costs.contains("tbb:simple,1")) {
+    EXPECT_GT(costs.at("tbb:simple,1").chunk_seconds.value_or(1), 0);
+    EXPECT_EQ(costs.at("tbb:static").chunk_seconds, 0);  // one a thread, however many iterations
+  }
   EXPECT_EQ(costs.at("openmp:static").chunk_seconds, 0);  // one a thread, however many iterations
   for (const auto& [schedule, cost] : costs) {
     if (schedule.starts_with("openmp")) {
       EXPECT_GT(cost.start_seconds.value_or(0), 0) << schedule;
     }
+    EXPECT_LT(cost.start_seconds.value_or(0), 1) << schedule;
+    EXPECT_LT(cost.chunk_seconds.value_or(0), 1e-3) << schedule;
   }
 }
 

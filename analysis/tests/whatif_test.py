@@ -201,7 +201,7 @@ def test_an_unmeasured_overhead_is_said(tmp_path):
     assert any("No overhead of a chunk was measured for openmp guided (libgomp)" in line for line in whatif.cautions(m))
 
 
-@pytest.mark.parametrize("threads, words", [(1, "measured on 1 thread, where nobody contends"), (2, "measured on 2 threads; with more")])
+@pytest.mark.parametrize("threads, words", [(1, "measured on 1 thread, where nobody contends"), (2, "measured on 2 threads, of oneTBB on one")])
 def test_the_threads_of_the_overhead_are_said(tmp_path, threads, words):
     assert any(words in line for line in whatif.cautions(model(tmp_path, [1.0, 2.0], threads=threads)))
 
