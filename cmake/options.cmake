@@ -49,6 +49,17 @@ function(rasterbench_lanes folder)
   target_sources(${folder} PUBLIC $<TARGET_OBJECTS:${folder}_lanes>)
 endfunction()
 
+# rasterbench_unoptimised(TARGETS...): compiles them at -O0 under sanitizers, in half of the time or less. For unit tests and
+# for folders that hardly compute. No check is lost: an optimiser removes checks, it adds none. The stages, kernels and
+# references, in which tests spend their time, stay at the -O1 of the preset.
+function(rasterbench_unoptimised)
+  if(RASTERBENCH_SANITIZE)
+    foreach(target ${ARGN})
+      target_compile_options(${target} PRIVATE -O0)
+    endforeach()
+  endif()
+endfunction()
+
 # What sanitizers need: the programs need not be compiled a second time.
 add_custom_target(unit_tests)
 
@@ -57,6 +68,7 @@ function(rasterbench_test folder)
   cmake_parse_arguments(ARG "" "" "LIBRARIES" ${ARGN})
   add_executable(${folder}_test ${ARG_UNPARSED_ARGUMENTS})
   target_link_libraries(${folder}_test PRIVATE ${ARG_LIBRARIES} GTest::gtest_main)
+  rasterbench_unoptimised(${folder}_test)
   add_dependencies(unit_tests ${folder}_test)
   # Tests run side by side, on more threads than CPUs: waiting threads that spin would take the CPU from those they wait for.
   gtest_discover_tests(${folder}_test TEST_PREFIX "${folder}." DISCOVERY_TIMEOUT 60
