@@ -46,10 +46,19 @@ def whatif(folder: Path) -> tuple[Path, Path]:
 WRITERS = {"adopt": adopt, "trace": trace, "stability": stability, "whatif": whatif}
 
 
-@pytest.fixture(params=WRITERS)
-def drawn(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[str, Path, Path]:
-    """The name of a writer, what it read and where it drew."""
-    return request.param, *WRITERS[request.param](tmp_path)
+@pytest.fixture(params=WRITERS, scope="module")
+def drawn_once(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path, Path, Path]:
+    """To draw takes most of the time of these tests."""
+    folder = tmp_path_factory.mktemp(request.param)
+    return request.param, folder, *WRITERS[request.param](folder)
+
+
+@pytest.fixture
+def drawn(drawn_once: tuple[str, Path, Path, Path], tmp_path: Path) -> tuple[str, Path, Path]:
+    """The name of a writer, what it read and where it drew: a copy, which a test may change."""
+    name, made, source, folder = drawn_once
+    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
+    return name, tmp_path / source.relative_to(made), tmp_path / folder.relative_to(made)
 
 
 def findings(folder: Path, rule: str | None = None) -> list[lint.Finding]:
