@@ -1,15 +1,30 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Callable
+from typing import Any, Callable, Iterator
 
 import pytest
 
-from .. import load, report
+from .. import load, report, style
 from ..comparison import Analysis
 from . import synthetic
 
 FEW = [("openmp", "static", None), ("openmp", "dynamic", 1), ("tbb", "auto", None)]
+
+
+@pytest.fixture(scope="session", autouse=True)
+def quick_fonts() -> Iterator[int]:
+    """Gives what kind of fonts PDFs have, which is another one in tests that do not ask for `published_fonts`: to subset TrueType fonts
+    takes a third of the time in which a report is drawn. The programs that tests/ runs embed the published kind."""
+    kind = style.RC["pdf.fonttype"]
+    style.RC["pdf.fonttype"] = 3
+    yield kind
+    style.RC["pdf.fonttype"] = kind
+
+
+@pytest.fixture
+def published_fonts(quick_fonts: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(style.RC, "pdf.fonttype", quick_fonts)
 
 
 @pytest.fixture

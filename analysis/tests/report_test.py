@@ -97,9 +97,10 @@ def test_figures_exist_in_all_formats(full, kind):
             assert edge[..., :3].min() > 0.99, name
 
 
-def test_output_is_deterministic(study, capsys):
+def test_output_is_deterministic(study, capsys, published_fonts):
     directory = study()
     prints_three(capsys, directory)
+    assert all(b"/CIDFontType2" in path.read_bytes() and b"/Type3" not in path.read_bytes() for path in directory.glob("figures/*.pdf"))
     first = {p.name: p.read_bytes() for p in directory.rglob("*") if p.is_file()}
     prints_three(capsys, directory)
     assert first == {p.name: p.read_bytes() for p in directory.rglob("*") if p.is_file()}
