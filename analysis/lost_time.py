@@ -5,9 +5,9 @@ P T(P) - T(1) = work inflation + locks + imbalance + dispatch + synchronisation 
 T(1) is the serial backend's frame of the same kernel where the study has it, else the point's own on one thread. Of the raster stage each
 sample has a time R and the busy times of its threads (between the stamps of each loop), of which the longest, the mean b, longest - b and the
 time outside, o = R - longest, are taken within the sample, and so is the time w that the threads waited for locks; each term is made of medians of these over the samples (raster_loop.py). The
-base's are marked 1, the point's own on one thread s:
+base's are marked 1, the point's own on one thread s, for which the base stands where the study has no such point:
 
-  dispatch          b_s - b_1               handing out chunks, on one thread; unknown without a serial point
+  dispatch          b_s - b_1               handing out chunks, on one thread; unknown where either point is missing
   locks             w                       waiting for locks that others held, within the busy time; none on one thread
   work inflation    P b - b_s - w           the same work on P threads: caches, atomics that had to be repeated, contended hand-out
   imbalance         P (longest - b)         waiting for the longest
@@ -44,7 +44,7 @@ SPLIT = ("isa", "tile", "generality", "techniques", "cache")  # axes that a seri
 
 @dataclass(frozen=True)
 class LostTime:
-    """One point; milliseconds of thread time, medians. dispatch is None where no serial point tells it from the work."""
+    """One point; milliseconds of thread time, medians. dispatch is None where no two points tell it from the work."""
 
     record: Record
     base: Record  # T(1)
@@ -81,12 +81,11 @@ def _loop(record: Record) -> RasterLoop | None:
 
 
 def lost_time(analysis: Analysis, group: Group, record: Record) -> LostTime | None:
-    """None where the point has one thread, no stamps, or no point on one thread."""
-    alone = analysis.thread_base[record.id]
-    if record.config.threads == 1 or alone is None:
+    """None where the point has one thread, no stamps, or neither a serial point nor one of its own on one thread."""
+    serial, itself = serial_of(group, record), analysis.thread_base[record.id]
+    base, alone = serial or itself, itself or serial
+    if record.config.threads == 1 or base is None or alone is None:
         return None
-    serial = serial_of(group, record)
-    base = serial or alone
     own, of_alone, of_base = (_loop(r) for r in (record, alone, base))
     if own is None or of_alone is None or of_base is None:
         return None
@@ -96,7 +95,7 @@ def lost_time(analysis: Analysis, group: Group, record: Record) -> LostTime | No
         "inflation": threads * own.mean - of_alone.mean - own.lock_wait,
         "locks": own.lock_wait,
         "imbalance": threads * own.imbalance,
-        "dispatch": of_alone.mean - of_base.mean if serial else None,
+        "dispatch": of_alone.mean - of_base.mean if base is not alone else None,
         "synchronisation": threads * (own.outside - of_base.outside),
         "serial": (threads - 1) * of_base.outside,
         "others": sum(threads * stage(record, name) - stage(base, name) for name in STAGES if name != "raster")}
@@ -123,8 +122,9 @@ def tables(analysis: Analysis) -> list[Table]:
                          | {"failed exchanges": f"{one.failed_exchanges:.0f}", "base": "serial" if one.over_serial else "itself, 1 thread"})
     if not numbers:
         return []
-    split = "" if all(one["base"] == "serial" for one in words) else \
-        " Where the study has no serial point of the kernel, dispatch cannot be told from the work: it is missing and lies in both."
+    split = "" if all(one["dispatch_ms"] is not None for one in numbers) else \
+        " Where the study has not both a serial point of the kernel and the point itself on one thread, dispatch cannot be told from the work:" \
+        " it is missing and lies in work inflation, or in T(1) too."
     return [Table("lost_time", "Lost time of each point",
                   "Milliseconds of thread time: P T(P) - T(1) and the terms that add up to it, of medians; analysis/lost_time.py has their"
                   " formulas. Waiting for locks is measured where a thread finds one taken; failed exchanges are compare-exchanges of a frame"

@@ -71,8 +71,9 @@ def _draw(analysis: Analysis, group: Group) -> Iterator[Drawing]:
         for at in (0, 100):
             frame.axes.axvline(at, color="black", lw=0.8, ls="-" if at == 0 else (0, (4, 2)), zorder=4)
         on_page = [order[kernel, row.label] for (_, row), kernel in zip(frame.rows, kernels)]
+        both = sum(one.terms["dispatch"] is not None for one in on_page)
         notes = [f"T(1) is the serial backend's frame of the same kernel ({sum(one.over_serial for one in on_page)} of {len(on_page)} bars), else the"
-                 " point's own on one thread, and then dispatch is not told from the work.",
+                 f" point's own on one thread; dispatch is told from the work where the study has both ({both} of {len(on_page)} bars).",
                  f"Bars are of medians ({analysis.sampled([one.record for one in on_page])} samples), without intervals; the largest residual is"
                  f" {100 * lost_time.worst_residual(on_page):.1f} % of P T(P).",
                  "Work inflation holds repeated atomics and contended hand-out; terms below 0 save time and stand left of it.",

@@ -55,6 +55,20 @@ def test_terms_of_known_times(study: MakeStudy) -> None:
     assert one.terms == pytest.approx({"inflation": 2, "locks": 0, "imbalance": 3, "dispatch": 1, "synchronisation": 2, "serial": 2, "others": 4, "residual": 0})
 
 
+def test_a_serial_point_alone_is_base_enough(study: MakeStudy) -> None:
+    def no_point_on_one_thread(records: list[dict[str, Any]]) -> None:
+        records[:] = [r for r in records if r["config"]["backend"] == "serial" or r["config"]["threads"] > 1]
+
+    directory = study(kernels=["tile_parallel"], edit=no_point_on_one_thread)
+    set_times(directory, known)
+    one = found(directory)
+    assert one.over_serial and one.terms == pytest.approx(
+        {"inflation": 3, "locks": 0, "imbalance": 3, "dispatch": None, "synchronisation": 2, "serial": 2, "others": 4, "residual": 0})
+    assert "cannot be told" in lost_time.tables(analyse(directory))[0].note
+    drawn = list(draw(analyse(directory)))
+    assert drawn and "where the study has both (0 of" in drawn[0].caption.body
+
+
 def test_waiting_for_locks_is_not_work_inflation(study: MakeStudy) -> None:
     directory = study(kernels=["tile_parallel"])
     set_times(directory, known)
@@ -162,7 +176,10 @@ def test_a_bad_raster_loop_is_named(study: MakeStudy, loop: Any) -> None:
 
 @pytest.mark.parametrize("without", ["one thread", "stamps"])
 def test_none_where_something_is_missing(study: MakeStudy, without: str) -> None:
-    directory = study(kernels=["tile_parallel"], threads=[2] if without == "one thread" else [1, 2])
+    def no_base(records: list[dict[str, Any]]) -> None:
+        records[:] = [r for r in records if r["config"]["threads"] > 1]
+
+    directory = study(kernels=["tile_parallel"], edit=no_base if without == "one thread" else None)
     set_times(directory, lambda config: known(config) if without == "one thread" else (known(config)[0], [0.0] * config["threads"]))
     analysis = analyse(directory)
     assert lost_time.lost_times(analysis, analysis.groups[0]) == [] and lost_time.tables(analysis) == [] and list(draw(analysis)) == []
