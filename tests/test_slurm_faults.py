@@ -103,6 +103,12 @@ def other_build(path: Path) -> Path:
     return path
 
 
+def planned_families(study: Path) -> set[str]:
+    """On the 16 CPUs that the cluster of commands says it has."""
+    said = subprocess.run([program(), "study", study, "--list", "--json", "--cpus", "16"], capture_output=True, text=True, check=True)
+    return {family["id"] for family in json.loads(said.stdout)["families"]}
+
+
 # Submitted once, and no more.
 
 @pytest.mark.parametrize("variable", ["SQUEUE_STATES", "SQUEUE_PARTITION", "SINFO_PARTITION", "SACCT_FORMAT", "SCONTROL_ALL",
@@ -135,6 +141,21 @@ def test_a_job_of_a_submit_that_died_is_found(fake: Fake, study: Path, out: Path
     path.write_text(json.dumps(record))
     assert "what is missing is in the queue" in fake.submit(study, out).ok().stdout
     assert submission(out, 1)["arrays"][0]["job"] == 101 and submission(out, 1)["merge"] == 102 and len(fake.queue()) == 2
+
+
+def test_status_and_a_dry_run_know_the_job_of_a_submit_that_died(fake: Fake, study: Path, out: Path) -> None:
+    """And write nothing: that is for submit, which holds the lock."""
+    fake.submit(study, out, "--program", program()).ok()
+    path = out / "slurm/submissions/1/submission.json"
+    record = json.loads(path.read_text())
+    record["arrays"][0]["job"] = None
+    path.write_text(json.dumps(record))
+    said = fake.run(ROOT / "slurm/status", out)
+    assert said.code == 3 and "job 101_0: Priority" in said.stdout and "2 pending, 0 failed, 0 missing" in said.stdout
+    assert "families: 0 done, 0 running, 2 pending" in fake.submit(study, out, "--dry-run").ok().stdout
+    assert json.loads(path.read_text()) == record
+    fake.set("jobs", "")
+    assert "not submitted" in fake.run(ROOT / "slurm/status", out).stdout
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
@@ -198,6 +219,25 @@ def test_another_plan_is_refused(fake: Fake, study: Path, out: Path, tmp_path: P
     said = fake.submit(study, out, "--cpus", 8, "--replan", "--program", program()).ok()
     assert families(out) == [f"{stale.name}.replanned-1"] and stale.name in said.stdout and manifest(out)["cpus"] == 8
     assert fake.submit(study, out, "--cpus", 8).code == 0
+
+
+def test_jobs_of_an_earlier_plan_are_not_left_in_the_queue(fake: Fake, study: Path, out: Path, tmp_path: Path) -> None:
+    """Of another study text, and of another program whose families have the same names."""
+    fake.submit(study, out, "--program", program()).ok()
+    before, text = (out / "slurm/manifest.json").read_bytes(), study.read_text()
+    words = ["2 jobs of an earlier plan", "0 of them running", "scancel 101"]
+    for options in (["--replan", "--dry-run"], ["--replan"], []):  # no result is there yet: a program alone needs no --replan
+        one_line(fake.submit(study, out, *options, "--program", other_build(tmp_path / "other")), "slurm/submit", 2, words)
+    study.write_text(text.replace("64x48", "32x24"))
+    line = one_line(fake.submit(study, out, "--replan", "--program", program()), "slurm/submit", 2, ["1 jobs", "scancel '101_["])
+    (stale,) = {family["id"] for family in json.loads(before)["families"]} - planned_families(study)
+    index = next(number for number, family, _ in map(str.split, (out / "slurm/submissions/1/c4.tasks").read_text().splitlines())
+                 if family == stale)
+    assert line.endswith(f"scancel '101_[{index}]'"), "what both plans have may go on"
+    assert (out / "slurm/manifest.json").read_bytes() == before and len(fake.queue()) == 2 and not (out / "slurm/submissions/2").exists()
+    fake.set("jobs", "")
+    fake.submit(study, out, "--replan", "--program", program()).ok()
+    assert (out / "slurm/manifest.json").read_bytes() != before and len(fake.queue()) == 2
 
 
 def test_records_of_an_earlier_plan_are_set_aside(fake: Fake, study: Path, out: Path) -> None:

@@ -21,7 +21,8 @@ import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Iterator
+from types import MappingProxyType
+from typing import Any, Iterator, Mapping
 
 SCHEMA = 1
 # What merge takes from a family's context.json.
@@ -143,6 +144,11 @@ def write_whole(path: Path, content: str | bytes) -> None:
         raise
 
 
+def comment_of(token: str, name: str) -> str:
+    """By which a job is found whose sbatch was given up, or whose submit died, before the id was written down."""
+    return f"rasterbench-{token}-{name}"
+
+
 def dump(value: object) -> str:
     return json.dumps(value, indent=1, ensure_ascii=False) + "\n"
 
@@ -203,16 +209,31 @@ class Folder:
             raise InputError(path, "arrays: expected a list of {tasks, job, ...}")
         return value
 
-    def elements(self) -> dict[str, list[Element]]:
-        """By family: the elements that were to measure it, the latest first."""
+    def unfinished(self) -> Iterator[tuple[int, dict[str, Any]]]:
+        """Submissions that have no job for an array or for the merge."""
+        for number in self.submissions():
+            record = self.submission(number)
+            if isinstance(record.get("token"), str) and None in [record.get("merge"), *(entry["job"] for entry in record["arrays"])]:
+                yield number, record
+
+    def elements(self, by_comment: Mapping[str, int] = MappingProxyType({})) -> dict[str, list[Element]]:
+        """By family: the elements that were to measure it, the latest first. `by_comment`: SLURM's jobs, for arrays whose id was
+        never written down."""
         found: dict[str, list[Element]] = {}
         for number in reversed(self.submissions()):
-            for array in self.submission(number)["arrays"]:
-                if array["job"] is None:
+            record = self.submission(number)
+            for array in record["arrays"]:
+                job = array["job"] or by_comment.get(comment_of(str(record.get("token")), array["tasks"].removesuffix(".tasks")))
+                if job is None:
                     continue
                 for index, family in self.tasks(number, array["tasks"]):
-                    found.setdefault(family, []).append(Element(number, array["job"], index))
+                    found.setdefault(family, []).append(Element(number, job, index))
         return found
+
+    def build_of(self, number: int) -> str | None:
+        """The program of a submission; None where it was killed before it wrote its plan down. Throws InputError."""
+        path = self.slurm / "submissions" / str(number) / "manifest.json"
+        return manifest_of(read_json(path), path).build_id if path.exists() else None
 
     def tasks(self, number: int, name: str) -> list[tuple[int, str]]:
         """Index and family of each line. Throws InputError."""

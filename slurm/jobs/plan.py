@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Sequence
 
-from .folder import Failure, Family, Folder, InputError, Manifest, manifest_of, write_whole
+from .folder import Failure, Family, Folder, InputError, Manifest, comment_of, manifest_of, write_whole
 from .site import HERE, Site
 
 ROOT = HERE.parent
@@ -68,11 +68,6 @@ def arrays_of(families: Sequence[Family], per_task: int, max_array_size: int, cp
         for number, part in enumerate(parts, start=1):
             arrays.append(Array(f"c{cpus}" + (f"-{number}" if len(parts) > 1 else ""), cpus, part))
     return arrays
-
-
-def comment_of(token: str, name: str) -> str:
-    """By which a job is found whose sbatch was given up, or whose submit died, before the id was written down."""
-    return f"rasterbench-{token}-{name}"
 
 
 def log_pattern(folder: Folder, name: str) -> str:

@@ -22,9 +22,14 @@ class State:
     in_queue: bool = False
 
 
+def elements_of(folder: Folder) -> dict[str, list[Element]]:
+    """Folder.elements(), with jobs that are known by their comment only. Throws Failure where SLURM does not answer."""
+    return folder.elements(cluster.jobs_by_comment() if any(folder.unfinished()) else {})
+
+
 def of_families(folder: Folder, manifest: Manifest, ask_slurm: bool = True) -> list[State]:
     """In the plan's order. Throws Failure where SLURM should say more and does not answer."""
-    elements = folder.elements()
+    elements = elements_of(folder) if ask_slurm else folder.elements()
     results = {family.id: folder.result(family, manifest.build_id) for family in manifest.families}
     open_elements = {family.id: elements.get(family.id, []) for family in manifest.families if results[family.id].kind != "done"}
     latest = [found[0] for found in open_elements.values() if found]

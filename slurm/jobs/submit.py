@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any, Iterator, Sequence
 
 from . import cluster, options as sbatch, states
-from .folder import Failure, Folder, InputError, Manifest, dump, write_whole
-from .plan import (ROOT, Array, array_command, arrays_of, check_plan, comment_of, frozen_study, merge_command, outside, plan_of,
-                   plan_script, stored_plan)
+from .folder import Element, Failure, Folder, InputError, Manifest, comment_of, dump, write_whole
+from .plan import (ROOT, Array, array_command, arrays_of, check_plan, frozen_study, merge_command, outside, plan_of, plan_script,
+                   stored_plan)
 from .site import HERE, Site
 from .usage import Parser, guarded
 
@@ -187,6 +187,8 @@ def to_submit(folder: Folder, manifest: Manifest, ask_slurm: bool) -> tuple[list
 
 
 def show(folder: Folder, manifest: Manifest, options: argparse.Namespace, extra: list[str], size: int, name: str, offline: bool) -> int:
+    if not offline:
+        check_queue(folder, manifest)
     everything, missing = to_submit(folder, manifest, not offline)
     arrays = arrays_of([s.family for s in missing], options.per_task, size, manifest.value["cpus"])
     describe(manifest, arrays, everything)
@@ -216,14 +218,10 @@ def show(folder: Folder, manifest: Manifest, options: argparse.Namespace, extra:
 def submit(folder: Folder, manifest: Manifest, site: Site, program: Path, options: argparse.Namespace, extra: list[str], size: int,
            name: str) -> int:
     find_lost_jobs(folder)
+    check_queue(folder, manifest)
     everything, missing = to_submit(folder, manifest, True)
     arrays = arrays_of([s.family for s in missing], options.per_task, size, manifest.value["cpus"])
     describe(manifest, arrays, everything)
-    planned = {family.id for family in manifest.families}
-    stale = cluster.active([e for family, found in folder.elements().items() if family not in planned for e in found])
-    if stale:
-        jobs = " ".join(sorted({str(element.job) for element in stale}))
-        print(f"slurm/submit: of an earlier plan, still in the queue: scancel {jobs}", file=sys.stderr)
     for path in outside(folder, manifest):
         print(f"slurm/submit: of an earlier plan, kept: {set_aside(path, 'replanned')}")
     write_whole(folder.manifest_path, dump(manifest.value))
@@ -309,33 +307,50 @@ def submit_merge(folder: Folder, submission: Path, record: dict[str, Any], optio
         write_whole(submission / "submission.json", dump(record))
 
 
-def unfinished(folder: Folder) -> Iterator[tuple[Path, dict[str, Any]]]:
-    """Submissions that have no job for an array or for the merge."""
-    for number in folder.submissions():
-        record = folder.submission(number)
-        if isinstance(record.get("token"), str) and None in [record.get("merge"), *(entry["job"] for entry in record["arrays"])]:
-            yield folder.slurm / "submissions" / str(number), record
+def check_queue(folder: Folder, manifest: Manifest) -> None:
+    """Jobs run the program and the study that were frozen when they were submitted: what they still measure for another plan
+    would cost time and stand in the way of this one. To cancel them is left to the user, because some may have measured for
+    hours. Throws InputError that says the command."""
+    planned = {family.id for family in manifest.families}
+    builds = {number: folder.build_of(number) for number in folder.submissions()}
+    elements = states.elements_of(folder)
+
+    def is_other(family: str, element: Element) -> bool:
+        return family not in planned or builds[element.submission] not in (None, manifest.build_id)
+
+    active = cluster.active([element for found in elements.values() for element in found])
+    other = {element for family, found in elements.items() for element in found if element in active and is_other(family, element)}
+    if not other:
+        return
+    words = []
+    for job in sorted({element.job for element in other}):
+        indices = sorted(element.index for element in other if element.job == job)
+        is_whole = all(element in other for element in active if element.job == job)
+        words.append(str(job) if is_whole else f"{job}_[{','.join(map(str, indices))}]")
+    running = sum(not active[element].is_pending for element in other)
+    raise InputError(folder.root, f"{len(other)} jobs of an earlier plan are in the queue, {running} of them running: cancel them, then"
+                     f" submit again: {shlex.join(['scancel', *words])}")
 
 
 def find_lost_jobs(folder: Folder) -> None:
     """Writes down jobs that were taken after sbatch had been given up, or while submit was killed: they are not missing."""
-    open_ones = list(unfinished(folder))
+    open_ones = list(folder.unfinished())
     known = cluster.jobs_by_comment() if open_ones else {}
-    for submission, record in open_ones:
+    for number, record in open_ones:
         for entry in record["arrays"]:
             if entry["job"] is None:
                 entry["job"] = known.get(comment_of(record["token"], entry["tasks"].removesuffix(".tasks")))
         record["merge"] = record.get("merge") or known.get(comment_of(record["token"], "merge"))
-        write_whole(submission / "submission.json", dump(record))
+        write_whole(folder.slurm / "submissions" / str(number) / "submission.json", dump(record))
 
 
 def submit_lost_merges(folder: Folder, options: argparse.Namespace, name: str, extra: Sequence[str]) -> None:
     """The merge job of arrays that are in the queue, where sbatch refused it when they were submitted."""
-    for submission, record in unfinished(folder):
-        elements = [element for found in folder.elements().values() for element in found if str(element.submission) == submission.name]
+    for number, record in folder.unfinished():
+        elements = [element for found in folder.elements().values() for element in found if element.submission == number]
         if record.get("merge") is None and cluster.active(elements):
-            submit_merge(folder, submission, record, options, name, extra)
-            print(f"submitted merge of submission {submission.name} as job {record['merge']}")
+            submit_merge(folder, folder.slurm / "submissions" / str(number), record, options, name, extra)
+            print(f"submitted merge of submission {number} as job {record['merge']}")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
