@@ -472,7 +472,7 @@ class _Reader:
         values = self.numbers(self.value, "loop_ms")
         if len(values) != n:
             raise self.fail("loop_ms", f"holds {len(values)} values for {n} samples")
-        return values if len(values) and values.min() > 0 else None  # zeros: frames without stamps
+        return values if len(values) and values.min() > 0 else None  # zeros: frames without stamps, in older records
 
     def stages(self, n: int) -> dict[str, np.ndarray]:
         source = self.mapping("stages_ms")

@@ -1,9 +1,10 @@
 // What holds a worker up besides its own work: other workers, at a lock or at an atomic word.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <mutex>
+
+#include "execution/stamp_clock.h"
 
 namespace rasterbench {
 
@@ -26,11 +27,11 @@ struct Contention {
 inline std::unique_lock<std::mutex> lock_counted(std::mutex& mutex, Contention& contention) {
   std::unique_lock lock(mutex, std::try_to_lock);
   if (!lock.owns_lock()) {
-    const auto begin = std::chrono::steady_clock::now();
+    const double begin = StampClock::now();
     lock.lock();
+    // The clock is read while the lock is held: others wait for it that much longer.
+    contention.lock_wait_seconds += StampClock::now() - begin;
     ++contention.contended_locks;
-    contention.lock_wait_seconds +=
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   }
   return lock;
 }

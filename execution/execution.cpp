@@ -18,6 +18,7 @@
 #include "base/error.h"
 #include "base/suggest.h"
 #include "execution/loop_trace.h"
+#include "execution/stamp_clock.h"
 
 namespace rasterbench {
 namespace {
@@ -47,25 +48,25 @@ Execution::Execution(const ExecutionConfig& config)
     : config_(config),
       stamped_(std::getenv("RASTERBENCH_NO_STAMPS") == nullptr),
       tally_(static_cast<std::size_t>(config.threads)),
-      sightings_(static_cast<std::size_t>(config.threads)) {}
+      sightings_(static_cast<std::size_t>(config.threads)) {
+  if (stamped_) StampClock::calibrate();
+}
 
 void Execution::loop(std::int64_t n, LoopBody body) {
-  // A serial loop is stamped around its iterations, and has no start and no join besides: the clock is not
-  // read again, which kernels with a loop for each triangle would feel.
-  if (config_.backend == "serial") {
-    const double before = tally_[0].busy_seconds;
-    run_loop(n, body);
-    loop_seconds_ += tally_[0].busy_seconds - before;
-    return;
-  }
-  const double begin = stamped_ ? now() : 0;
+  if (!stamped_ || ++loops_ > kTimedLoops) return run_loop(n, body);
+  const double begin = StampClock::now();
   run_loop(n, body);
-  if (stamped_) loop_seconds_ += now() - begin;
+  loop_seconds_ += StampClock::now() - begin;
+}
+
+std::optional<double> Execution::loop_seconds() const {
+  return stamped_ && loops_ <= kTimedLoops ? std::optional(loop_seconds_) : std::nullopt;
 }
 
 void Execution::reset_tally() {
   std::fill(tally_.begin(), tally_.end(), WorkerTally{});
   loop_seconds_ = 0;
+  loops_ = 0;
 }
 
 void Execution::reset_sightings() {
@@ -85,10 +86,6 @@ void Sightings::look() {
     ++moves;
   last = cpu;
   if (std::find(cpus.begin(), cpus.end(), cpu) == cpus.end()) cpus.push_back(cpu);
-}
-
-double Execution::now() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
 ObservedThreads observe_threads(Execution& execution) {

@@ -85,8 +85,11 @@ class Execution {
   virtual void uniform_loop(std::int64_t n, LoopBody body) = 0;
 
   std::span<const WorkerTally> tally() const { return tally_; }
-  /// Seconds that loop() took since the last reset, from its call to its return: with start and join.
-  double loop_seconds() const { return loop_seconds_; }
+  /// Seconds that loop() took since the last reset, from its call to its return: with start and join. Empty
+  /// after more than kTimedLoops calls, which are so short that two more stamps would show, and without
+  /// stamps.
+  std::optional<double> loop_seconds() const;
+  static constexpr int kTimedLoops = 64;
   /// Where the body of a loop counts what held its worker up.
   Contention& contention_of(int worker) { return tally_of(worker).contention; }
   void reset_tally();
@@ -99,8 +102,6 @@ class Execution {
  protected:
   virtual void run_loop(std::int64_t n, LoopBody body) = 0;
 
-  /// Seconds of a monotonic clock.
-  static double now();
   WorkerTally& tally_of(int worker) { return tally_[static_cast<std::size_t>(worker)]; }
   Sightings& sightings_of(int worker) { return sightings_[static_cast<std::size_t>(worker)]; }
   /// Whether loops are stamped and counted: always, but where RASTERBENCH_NO_STAMPS is set in the environment
@@ -112,6 +113,7 @@ class Execution {
   bool stamped_;
   std::vector<WorkerTally> tally_;
   double loop_seconds_ = 0;
+  std::int64_t loops_ = 0;  // since the last reset
   std::vector<Sightings> sightings_;
 };
 

@@ -109,11 +109,26 @@ TEST_P(EveryConfig, RunsWithoutStampsWhereTheyAreLeftOut) {
   bare->loop(1000, [&](std::int64_t, int) { ++runs; });
   bare->uniform_loop(1000, [&](std::int64_t, int) { ++runs; });
   EXPECT_EQ(runs, 2000);
+  EXPECT_FALSE(bare->loop_seconds());
   for (const WorkerTally& tally : bare->tally()) {
     EXPECT_EQ(tally.iterations, 0);
     EXPECT_EQ(tally.chunks, 0);
     EXPECT_EQ(tally.busy_seconds, 0);
   }
+}
+
+TEST_P(EveryConfig, TimesLoopsWhereTheyAreFew) {
+  const auto execution = make_execution(GetParam());
+  const auto nothing = [](std::int64_t, int) {};
+  for (int loop = 0; loop < Execution::kTimedLoops; ++loop) execution->loop(1, nothing);
+  ASSERT_TRUE(execution->loop_seconds());
+  double busiest = 0;
+  for (const WorkerTally& tally : execution->tally()) busiest = std::max(busiest, tally.busy_seconds);
+  EXPECT_GE(*execution->loop_seconds(), busiest);
+  execution->loop(1, nothing);
+  EXPECT_FALSE(execution->loop_seconds());
+  execution->reset_tally();
+  EXPECT_EQ(execution->loop_seconds(), 0.0);
 }
 
 TEST_P(EveryConfig, TalliesChunks) {

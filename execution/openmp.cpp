@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "execution/execution.h"
+#include "execution/stamp_clock.h"
 
 namespace rasterbench {
 namespace {
@@ -26,7 +27,7 @@ class OpenMp final : public Execution {
     {
       const int worker = omp_get_thread_num();
       if (is_stamped()) {
-        const double begin = now();
+        const double begin = StampClock::now();
         Sightings& sightings = sightings_of(worker);
         sightings.look();
         std::int64_t iterations = 0, runs = 0, next = -1;
@@ -38,7 +39,7 @@ class OpenMp final : public Execution {
           next = i + 1;
         }
         WorkerTally& tally = tally_of(worker);
-        tally.busy_seconds += now() - begin;
+        tally.busy_seconds += StampClock::now() - begin;
         tally.iterations += iterations;
         tally.chunks += chunks_of(iterations, runs, kind, chunk);
         sightings.look();

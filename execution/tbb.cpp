@@ -12,6 +12,7 @@
 #include "execution/binding.h"
 #include "execution/execution.h"
 #include "execution/loop_trace.h"
+#include "execution/stamp_clock.h"
 
 namespace rasterbench {
 namespace {
@@ -94,7 +95,7 @@ class Tbb final : public Execution {
       Stamp& stamp = stamps_[static_cast<std::size_t>(worker)];
       WorkerTally& tally = tally_of(worker);
       if (stamp.epoch != epoch_) {
-        const double begin = now();
+        const double begin = StampClock::now();
         stamp = {.epoch = epoch_, .ranges = 0, .stamped_ranges = 0, .first = begin, .last = begin};
         sightings_of(worker).look();
       }
@@ -106,7 +107,7 @@ class Tbb final : public Execution {
       if (++stamp.ranges > 16 && are_short && stamp.ranges % 16 != 0) return;
       sightings_of(worker).look();
       tally.cpu = sightings_of(worker).last;
-      const double end = now();
+      const double end = StampClock::now();
       tally.busy_seconds += end - stamp.last;
       stamp.last = end;
       stamp.stamped_ranges = stamp.ranges;

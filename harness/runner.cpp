@@ -105,20 +105,20 @@ class Runner {
 
     if (Execution* execution = renderer->execution()) execution->reset_sightings();
     StageSeconds stages;
-    double loop_seconds = 0;
+    std::optional<double> loop_seconds;
     const FrameReport* report = nullptr;  // of the last frame; read after the clock has stopped
     benchmark::ClearRegisteredBenchmarks();
     benchmark::RegisterBenchmark(
         name.c_str(),
         [&](benchmark::State& state) {
-          loop_seconds = 0;
+          loop_seconds = 0.0;
           stages = {};  // Google Benchmark may be told to call this more than once: the last call counts
           for ([[maybe_unused]] const auto iteration : state) {
             const auto begin = std::chrono::steady_clock::now();
             for (int frame = 0; frame < frames; ++frame) {
               report = &renderer->draw();
               stages += report->seconds;
-              loop_seconds += report->loop_seconds;
+              loop_seconds = sum_of_known(loop_seconds, report->loop_seconds);
             }
             state.SetIterationTime(
                 std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
@@ -140,7 +140,7 @@ class Runner {
                         {"geometry", stage_ms(stages.geometry)},
                         {"raster", stage_ms(stages.raster)},
                         {"resolve", stage_ms(stages.resolve)}};
-    answer["loop_ms"] = renderer->execution() ? Json(loop_seconds * per_frame_ms) : Json();
+    answer["loop_ms"] = renderer->execution() ? stage_ms(loop_seconds) : Json();
     Json& threads = answer["per_thread"] = Json::array();
     for (std::size_t i = 0; i < report->raster_tally.size(); ++i) {
       const WorkerTally& worker = report->raster_tally[i];

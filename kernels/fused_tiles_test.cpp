@@ -295,8 +295,9 @@ TEST(FusedTiles, CountsItsStreams) {
   ASSERT_EQ(report.raster_tally.size(), 1u);
   EXPECT_EQ(report.raster_tally[0].iterations, 16);  // tiles: the batches of the geometry stage are not in it
   EXPECT_LE(report.raster_tally[0].busy_seconds, *report.seconds.raster);
-  EXPECT_GT(report.loop_seconds, 0);
-  EXPECT_LE(report.loop_seconds, *report.seconds.raster);
+  ASSERT_TRUE(report.loop_seconds);
+  EXPECT_GT(*report.loop_seconds, 0);
+  EXPECT_LE(*report.loop_seconds, *report.seconds.raster);
 
   const Scene dust = generate("teapot:triangles=30000");
   const auto of_dust = fused(dust, settings, {.count = true});

@@ -104,24 +104,30 @@ double seconds_of(Stage stage) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
+/// Empty where either is.
+inline std::optional<double> sum_of_known(std::optional<double> a, std::optional<double> b) {
+  return a && b ? std::optional(*a + *b) : std::nullopt;
+}
+
 /// What one frame did, besides its picture.
 struct FrameReport {
   StageSeconds seconds;
   GeometryCounts counts;
   std::vector<WorkerTally> raster_tally;  ///< per worker, of the raster stage
-  double loop_seconds = 0;                ///< of the raster stage, in the loop under study
-  WorkCounters counters;                  ///< of a renderer that counts; empty otherwise
+  /// Of the raster stage, in the loop under study; empty where Execution::loop_seconds() is.
+  std::optional<double> loop_seconds = 0.0;
+  WorkCounters counters;  ///< of a renderer that counts; empty otherwise
 
   void reset_tally() {
     raster_tally.clear();
-    loop_seconds = 0;
+    loop_seconds = 0.0;
   }
   /// Adds what `execution` has tallied since its last reset, which was the begin of a raster stage.
   void add_tally(const Execution& execution) {
     raster_tally.resize(execution.tally().size());
     for (std::size_t worker = 0; worker < raster_tally.size(); ++worker)
       raster_tally[worker] += execution.tally()[worker];
-    loop_seconds += execution.loop_seconds();
+    loop_seconds = sum_of_known(loop_seconds, execution.loop_seconds());
   }
 };
 
