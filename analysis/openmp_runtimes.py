@@ -8,7 +8,8 @@ from .schedule_model import RUNTIMES
 
 
 def asked(study: Study, record: Record) -> str | None:
-    """Of config.runtime, or, where that is the program's own, of libraries.openmp in the context; None: not known, or no OpenMP."""
+    """Of config.runtime, or, where that is the program's own, of libraries.openmp in the context; None: not known, as where
+    families that were merged had several, or no OpenMP."""
     if record.config.backend != "openmp":
         return None
     if record.config.runtime in RUNTIMES:

@@ -166,13 +166,15 @@ def edit(path: Path, change: Callable[[dict[str, Any]], Any]) -> None:
 
 def test_merged_files_are_a_study_and_say_where_they_come_from(finished: Path) -> None:
     plan, first = manifest(finished), manifest(finished)["families"][0]["id"]
-    edit(finished / "slurm/families" / first / "context.json", lambda c: c["machine"].update(cpu="Another CPU", cores=64))
+    edit(finished / "slurm/families" / first / "context.json", lambda c: (c["machine"].update(cpu="Another CPU", cores=64),
+                                                                                c["libraries"].update(openmp="another OpenMP")))
     said = NOWHERE.merge(finished, "--no-report")
     assert said.code == 0 and "2 types of nodes" in said.stdout, said.stderr
     merged, context = records(finished), json.loads((finished / "context.json").read_text())
     assert [r["id"] for r in merged] == [p["id"] for f in plan["families"] for p in f["points"]]
     assert {r["origin"]["node_type"] for r in merged if r["origin"]["family"] == first} == {"Another CPU, 64 cores in 1 packages"}
     assert context["machine"]["cpu"].startswith("differs between nodes: Another CPU; ") and len(context["parts"]) == 3
+    assert context["libraries"]["openmp"].startswith("differs between nodes: another OpenMP; ")
     own = json_lines(finished / "slurm/families" / first / "records.jsonl")
     assert [r["samples_ms"] for r in merged[:len(own)]] == [r["samples_ms"] for r in own]
     before = snapshot(finished)

@@ -70,8 +70,10 @@ def merged_context(manifest: Manifest, parts: Sequence[State], images: dict[str,
     context["environment"] = {key: value for key, value in contexts[0]["environment"].items()
                               if all(c["environment"].get(key) == value for c in contexts)}
     context["study"] |= {"shard": "1/1", "file": manifest.value["file"]}
-    for key in ("libraries", "scenes"):
-        context[key] = {name: value for c in contexts for name, value in c[key].items()}
+    context["scenes"] = {name: value for c in contexts for name, value in c["scenes"].items()}
+    # A runtime may be preloaded for some families: a value that is not of all must not be blamed on all.
+    context["libraries"] = {name: joined([c["libraries"][name] for c in contexts if name in c["libraries"]])
+                            for name in dict.fromkeys(name for c in contexts for name in c["libraries"])}
     limits = [c["limits"] for c in contexts if "limits" in c]
     if limits:
         rates = {json.dumps(rate, sort_keys=True): rate for limit in limits for rate in limit["rates"]}
