@@ -44,7 +44,8 @@ SPLIT = ("isa", "tile", "generality", "techniques", "cache")  # axes that a seri
 
 @dataclass(frozen=True)
 class LostTime:
-    """One point; milliseconds of thread time, medians. dispatch is None where no two points tell it from the work."""
+    """One point; milliseconds of thread time, medians. dispatch is None where no two points tell it from the work, locks where the record
+    is older than their being counted."""
 
     record: Record
     base: Record  # T(1)
@@ -52,7 +53,7 @@ class LostTime:
     useful: float  # T(1)
     terms: dict[str, float | None]
     per_sample: bool  # else imbalance is that of the threads' medians, of an older record
-    failed_exchanges: float  # a frame, of all threads
+    failed_exchanges: float | None  # a frame, of all threads; None: as locks
 
     @property
     def lost(self) -> float:
@@ -92,7 +93,7 @@ def lost_time(analysis: Analysis, group: Group, record: Record) -> LostTime | No
     threads = record.config.threads
     medians = {r.id: float(np.median(r.samples.values)) for r in (record, base)}
     terms: dict[str, float | None] = {
-        "inflation": threads * own.mean - of_alone.mean - own.lock_wait,
+        "inflation": threads * own.mean - of_alone.mean - (own.lock_wait or 0.0),
         "locks": own.lock_wait,
         "imbalance": threads * own.imbalance,
         "dispatch": of_alone.mean - of_base.mean if base is not alone else None,
@@ -119,7 +120,7 @@ def tables(analysis: Analysis) -> list[Table]:
             numbers.append(head | {"total_ms": one.total, "base_ms": one.useful, "lost_ms": one.lost}
                            | {f"{name}_ms": term for name, term in one.terms.items()} | {"failed_exchanges": one.failed_exchanges, "base": one.base.name, "per_sample": one.per_sample})
             words.append(head | {name: text.number(value) for name, value in of.items()}
-                         | {"failed exchanges": f"{one.failed_exchanges:.0f}", "base": "serial" if one.over_serial else "itself, 1 thread"})
+                         | {"failed exchanges": text.MISSING if one.failed_exchanges is None else f"{one.failed_exchanges:.0f}", "base": "serial" if one.over_serial else "itself, 1 thread"})
     if not numbers:
         return []
     split = "" if all(one["dispatch_ms"] is not None for one in numbers) else \
@@ -130,12 +131,16 @@ def tables(analysis: Analysis) -> list[Table]:
                   " formulas. Waiting for locks is measured where a thread finds one taken; failed exchanges are compare-exchanges of a frame"
                   " that found another thread's key, whose repetition is work inflation, as is contended hand-out; a negative term is time"
                   f" that several threads save. {RESIDUAL} Medians have no interval here: a term below the noise of the samples is none.{split}"
-                  f"{older_remark(older)}",
+                  f"{older_remark(older)}{uncounted_remark(sum(one['locks_ms'] is None for one in numbers))}",
                   pd.DataFrame(numbers), pd.DataFrame(words), section=SECTION, folded=len(words) > 16)]
 
 
 def older_remark(count: int) -> str:
     return f" Of {text.count(count, 'point')} imbalance is {raster_loop.REMARK}." if count else ""
+
+
+def uncounted_remark(count: int) -> str:
+    return f" Of {text.count(count, 'point')} waiting for locks is not known, in records of an older version: it lies in work inflation." if count else ""
 
 
 def worst_residual(found: list[LostTime]) -> float:

@@ -24,9 +24,9 @@ class RasterLoop:
     imbalance: float  # longest - mean
     outside: float | None  # stage - longest; None where an older record has no raster stage
     per_sample: bool
-    lock_wait: float = 0.0  # thread time, over the threads; in it they waited for locks
-    contended_locks: float = 0.0
-    failed_exchanges: float = 0.0
+    lock_wait: float | None = None  # thread time, over the threads; in it they waited for locks; None: an older record did not count it
+    contended_locks: float | None = None
+    failed_exchanges: float | None = None
 
     @property
     def ratio(self) -> float:
@@ -53,5 +53,5 @@ def of(record: Record) -> RasterLoop | None:
         return RasterLoop(mean, longest, longest - mean, None if raster is None else float(np.median(raster)) - longest, False)
     if said["busy_mean_ms"] <= 0:
         return None
-    held_up = (float(said.get(key, 0)) for key in HELD_UP_KEYS)
+    held_up = (None if said.get(key) is None else float(said[key]) for key in HELD_UP_KEYS)
     return RasterLoop(*(float(said[key]) for key in LOOP_KEYS), True, *held_up)

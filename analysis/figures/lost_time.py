@@ -77,7 +77,8 @@ def _draw(analysis: Analysis, group: Group) -> Iterator[Drawing]:
                  f"Bars are of medians ({analysis.sampled([one.record for one in on_page])} samples), without intervals; the largest residual is"
                  f" {100 * lost_time.worst_residual(on_page):.1f} % of P T(P).",
                  "Work inflation holds repeated atomics and contended hand-out; terms below 0 save time and stand left of it.",
-                 lost_time.RESIDUAL + lost_time.older_remark(sum(not one.per_sample for one in on_page))]
+                 lost_time.RESIDUAL + lost_time.older_remark(sum(not one.per_sample for one in on_page))
+                 + lost_time.uncounted_remark(sum(one.terms["locks"] is None for one in on_page))]
         if not complete:
             notes.append("Of each kernel and backend only the fastest execution is drawn; tables/lost_time.csv has all.")
         caption = captions.build(

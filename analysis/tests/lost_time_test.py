@@ -83,7 +83,11 @@ def test_records_from_before_contention_was_counted(study: MakeStudy) -> None:
     directory = study(kernels=["tile_parallel"])
     set_times(directory, known)
     edit(directory, lambda value: [(value["raster_loop"] or {}).pop(key, None) for key in HELD_UP_KEYS])
-    assert found(directory).terms["locks"] == 0
+    one = found(directory)
+    assert one.terms["locks"] is None and one.failed_exchanges is None and one.terms["residual"] == pytest.approx(0)
+    (table,) = lost_time.tables(analyse(directory))
+    assert set(table.words["waiting for locks"]) == {"–"} == set(table.words["failed exchanges"]) and "waiting for locks is not known" in table.note
+    assert any("waiting for locks is not known" in drawn.caption.body for drawn in draw(analyse(directory)))
     edit(directory, lambda value: (value["raster_loop"] or {}).update(lock_wait_ms=-1))
     with pytest.raises(InputError, match="records.jsonl:1.*raster_loop.lock_wait_ms"):
         analyse(directory)
