@@ -36,6 +36,7 @@ class LoopCosts:
     axes: dict[str, str | None] = field(default_factory=dict)  # by AXES; None: of an older version, which did not write it
     block: int = 1  # iterations that share a cost in the file, and were given equal parts of it
     raw: dict[str, Any] = field(repr=False, default_factory=dict)
+    steal: float | None = None  # of a oneTBB thread, for a range of another one, beyond one of its own; None: not measured
 
     @property
     def machine(self) -> str | None:
@@ -62,7 +63,8 @@ class LoopCosts:
 
     def overhead(self, backend: str, schedule: str, chunk: int | None) -> tuple[float, str]:
         """The measured overhead of a chunk and the name that it was measured under: the schedule's own with this chunk, else with
-        the nearest chunk by ratio, else 0 and "not measured"."""
+        the nearest chunk by ratio, else 0 and "not measured". Of oneTBB's auto, which makes too few ranges on one thread to measure them,
+        it is that of simple: a range costs the same whoever splits it."""
         wanted = f"{backend}:{schedule}" + ("" if chunk is None else f",{chunk}")
         if (found := self.dispatch.get(wanted)) is not None:
             return found, wanted
@@ -80,6 +82,8 @@ class LoopCosts:
         if known:
             smallest = min(known, key=lambda n: known[n])
             return self.dispatch[smallest], smallest
+        if (backend, schedule) == ("tbb", "auto"):
+            return self.overhead("tbb", "simple", chunk)
         return 0.0, "not measured"
 
 
@@ -131,11 +135,14 @@ def read(path: Path) -> LoopCosts:
     for name, cost in dispatch.items():
         if cost is not None and not (is_number(cost) and cost >= 0):
             raise InputError(path, f"expected a number that is not below 0, or null, found {cost!r}", None, f"dispatch_us.{name}")
+    steal = value.get("steal_us")
+    if steal is not None and not (is_number(steal) and steal >= 0):
+        raise fail("steal_us", "a number that is not below 0, or null")
     return LoopCosts(path, value["unit"], value["kernel"], value["numeric"], tuple(size), tile, value["threads"],
                      _spread(np.array(costs, dtype=float), n, block), None if serial is None else float(serial),
                      {name: None if cost is None else float(cost) for name, cost in dispatch.items()},
                      {key: value.get(key) for key in AXES}, block,
-                     {key: v for key, v in value.items() if key != "cost_us"})
+                     {key: v for key, v in value.items() if key != "cost_us"}, None if steal is None else float(steal))
 
 
 def _spread(costs: np.ndarray, n: int, block: int) -> np.ndarray:

@@ -90,8 +90,8 @@ class Model:
     """The predictions for one loop, each made once."""
 
     def __init__(self, costs: LoopCosts, steal: float | None = None) -> None:
-        """steal: microseconds of a steal; None: what a chunk costs."""
-        self.costs, self.steal = costs, steal
+        """steal: microseconds of a steal; None: as it was measured, or where it was not what a chunk costs."""
+        self.costs, self.steal = costs, costs.steal if steal is None else steal
         self.prefix = np.concatenate([[0.0], np.cumsum(costs.costs)])
         self._made: dict[tuple, Prediction] = {}
 
@@ -325,11 +325,15 @@ def cautions(model: Model) -> list[str]:
         lines.append(f"{dispatch}, where nobody contends for the next chunk: on more threads it costs several times that, so small chunks look better than"
                      " they are. Trace with --threads as many as there are CPUs.")
     else:
-        lines.append(f"{dispatch}, of oneTBB on one, whose ranges are its own until they are stolen; with more, more contend for OpenMP's next chunk.")
+        own = ", of oneTBB on one, whose ranges are its own until they are stolen" if "steal_us" in costs.raw else ""
+        lines.append(f"{dispatch}{own}; with more, more contend for OpenMP's next chunk.")
     if costs.block > 1:
         lines.append(f"Each {costs.block} consecutive iterations share one traced cost: smaller chunks look more even than they are.")
     if model.steal is None:
-        lines.append("A steal is taken to cost what a chunk does (--steal-us changes it).")
+        lines.append("What a oneTBB thread spends on a range that it steals was not measured: that of a chunk stands for it, which is less, so small grains look"
+                     " better than they are (--steal-us changes it).")
+    elif model.steal == costs.steal:
+        lines.append(f"A range that a oneTBB thread steals takes it {text.number(costs.steal)} us more than one of its own (--steal-us changes it).")
     return lines
 
 

@@ -10,7 +10,6 @@
 #include "base/error.h"
 #include "build_info.h"
 #include "harness/context.h"
-#include "harness/replay.h"
 #include "harness/statistics.h"
 #include "harness/verify.h"
 #include "kernels/kernel.h"
@@ -107,74 +106,6 @@ std::vector<Joined> join(const std::vector<TracedChunk>& chunks, std::int64_t to
     before.iterations += iterations;
   }
   return joined;
-}
-
-constexpr int kRepetitions = 9;
-
-/// A loop with an empty body: the shortest of several, since other load only lengthens it.
-struct EmptyLoop {
-  double seconds = std::numeric_limits<double>::infinity();
-  double chunks = 0;
-};
-
-EmptyLoop time_empty_loop(Execution& execution, std::int64_t n) {
-  EmptyLoop shortest;
-  for (int repetition = 0; repetition < kRepetitions; ++repetition) {
-    execution.reset_tally();
-    const double begin = LoopTrace::now();
-    execution.loop(n, [](std::int64_t, int) {});
-    const double seconds = LoopTrace::now() - begin;
-    double chunks = 0;
-    for (const WorkerTally& tally : execution.tally()) chunks += static_cast<double>(tally.chunks);
-    if (seconds < shortest.seconds) shortest = {seconds, chunks};
-  }
-  return shortest;
-}
-
-/// Seconds that oneTBB takes beyond one iteration for a loop of one a thread, the shortest of several. The
-/// iterations are long enough for its workers to come; a repetition that left one out does not count, and
-/// where few others are left nothing is known.
-std::optional<double> time_tbb_start(Execution& execution) {
-  constexpr double kIteration = 1e-4;
-  const std::int64_t chunk = execution.config().chunk.value_or(1);
-  constexpr int kLeastRepetitions = 3;
-  int counted = 0;
-  double shortest = std::numeric_limits<double>::infinity();
-  for (int repetition = 0; repetition < kRepetitions; ++repetition) {
-    execution.reset_tally();
-    const double begin = LoopTrace::now();
-    execution.loop(execution.threads() * chunk, [&](std::int64_t i, int) {
-      const double started = LoopTrace::now();
-      while (i % chunk == 0 && LoopTrace::now() - started < kIteration) {
-      }
-    });
-    const double seconds = LoopTrace::now() - begin - kIteration;
-    const auto is_idle = [](const WorkerTally& tally) { return tally.chunks == 0; };
-    if (std::any_of(execution.tally().begin(), execution.tally().end(), is_idle)) continue;
-    shortest = std::min(seconds, shortest);
-    ++counted;
-  }
-  return counted < kLeastRepetitions ? std::nullopt : std::optional(shortest);
-}
-
-/// Chunks of a loop: by the rule of the OpenMP runtime where it is known, else as they were seen.
-double chunks_of(const ExecutionConfig& config, std::int64_t n, const EmptyLoop& seen) {
-  const auto borders = chunk_borders(config, openmp_runtime(), n);
-  return borders.empty() ? seen.chunks : static_cast<double>(borders.size() - 1);
-}
-
-/// One round of measuring a schedule.
-struct EmptyLoops {
-  double start, further;  // seconds of the short loop, and of the long one beyond it
-  double chunks;          // of the long one beyond the short one
-};
-
-EmptyLoops time_empty_loops(Execution& execution, std::int64_t n) {
-  const ExecutionConfig& config = execution.config();
-  const std::int64_t least = std::int64_t{config.threads} * config.chunk.value_or(1);
-  const EmptyLoop start = time_empty_loop(execution, least), whole = time_empty_loop(execution, n);
-  return {start.seconds, whole.seconds - start.seconds,
-          chunks_of(config, n, whole) - chunks_of(config, least, start)};
 }
 
 }  // namespace
@@ -312,56 +243,6 @@ LoopCosts measure_loop_costs(const Point& point, const Scene& scene, int frames)
   return costs;
 }
 
-std::optional<double> beyond_noise(const std::vector<double>& rounds) {
-  constexpr std::size_t kLeastRounds = 7;
-  constexpr double kTimesTheNoise = 4, kErrorOfMedian = 1.2533, kDeviationOfMad = 1.4826;
-  if (rounds.size() < kLeastRounds) return {};
-  const double middle = median(rounds);
-  std::vector<double> distances;
-  for (const double value : rounds) distances.push_back(std::abs(value - middle));
-  const double noise =
-      kErrorOfMedian * kDeviationOfMad * median(distances) / std::sqrt(static_cast<double>(rounds.size()));
-  return middle > kTimesTheNoise * noise ? std::optional(middle) : std::nullopt;
-}
-
-std::map<std::string, ScheduleCost> measure_schedules(int threads) {
-  constexpr std::int64_t kIterations = 1 << 14;
-  constexpr int kMostRounds = 25;
-  std::map<std::string, ScheduleCost> costs;
-  for (const Schedule& schedule : schedules()) {
-    if (schedule.backend == "serial") continue;
-    // oneTBB leaves the ranges of a loop to the thread that split them. Another one steals, which is no
-    // hand-out, and an empty loop is over before it comes: what a range costs is told by one thread.
-    const bool is_tbb = schedule.backend == "tbb";
-    const int handed = is_tbb ? 1 : threads;
-    // The same loop with one chunk a thread: what the iterations themselves cost.
-    const auto even = make_execution({schedule.backend, "static", {}, handed, nullptr});
-    for (const std::optional<int> chunk :
-         {std::optional<int>(), std::optional<int>(1), std::optional<int>(16)}) {
-      if (chunk && schedule.chunk.empty()) continue;
-      const ExecutionConfig config{schedule.backend, schedule.name, chunk, handed, nullptr};
-      const auto execution = make_execution(config);
-      ScheduleCost& cost = costs[to_string(config)];
-      if (is_tbb)
-        cost.start_seconds =
-            time_tbb_start(*make_execution({schedule.backend, schedule.name, chunk, threads, nullptr}));
-      std::vector<double> rounds;  // seconds of a chunk
-      for (int round = 0; round < kMostRounds && !cost.chunk_seconds; ++round) {
-        const EmptyLoops of_even = time_empty_loops(*even, kIterations),
-                         own = time_empty_loops(*execution, kIterations);
-        if (!is_tbb) cost.start_seconds = std::min(own.start, cost.start_seconds.value_or(own.start));
-        if (own.chunks <= 0) {
-          cost.chunk_seconds = 0;  // more iterations make no more chunks
-          break;
-        }
-        rounds.push_back(handed * (own.further - of_even.further) / own.chunks);
-        cost.chunk_seconds = beyond_noise(rounds);
-      }
-    }
-  }
-  return costs;
-}
-
 std::string trace_text(const Point& point, const LoopShape& shape, const TracedFrame& frame,
                        const Json& image) {
   const std::size_t total = chunks_in(frame);
@@ -428,7 +309,7 @@ std::string trace_text(const Point& point, const LoopShape& shape, const TracedF
 }
 
 std::string costs_text(const Point& point, const std::string& scene_hash, const LoopShape& shape,
-                       const LoopCosts& costs, const std::map<std::string, ScheduleCost>& schedules) {
+                       const LoopCosts& costs, const ScheduleCosts& schedules) {
   const std::size_t n = costs.seconds.size(),
                     block = std::max<std::size_t>(1, (n + kMostCosts - 1) / kMostCosts);
   std::string list;
@@ -459,7 +340,8 @@ std::string costs_text(const Point& point, const std::string& scene_hash, const 
   const auto us_or_null = [](const std::optional<double>& seconds) {
     return seconds ? Json(rounded_us(*seconds)) : Json();
   };
-  for (const auto& [schedule, cost] : schedules) {
+  head["steal_us"] = us_or_null(schedules.steal_seconds);
+  for (const auto& [schedule, cost] : schedules.of) {
     head["dispatch_us"][schedule] = us_or_null(cost.chunk_seconds);
     head["start_us"][schedule] = us_or_null(cost.start_seconds);
   }

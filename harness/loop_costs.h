@@ -3,13 +3,12 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "execution/loop_trace.h"
 #include "harness/point.h"
+#include "harness/schedule_costs.h"
 
 namespace rasterbench {
 
@@ -68,30 +67,10 @@ struct LoopCosts {
 /// has loops of several lengths, so that an iteration has no place in the picture.
 LoopCosts measure_loop_costs(const Point& point, const Scene& scene, int frames);
 
-/// What a schedule costs in a loop whose iterations do nothing.
-struct ScheduleCost {
-  /// Of a loop with one chunk for each thread: to start it and to wait for all. Empty where oneTBB never
-  /// used all threads, or seldom.
-  std::optional<double> start_seconds;
-  /// That a thread spends on a further chunk beyond what the iterations take under the backend's static
-  /// schedule: of OpenMP while all others do the same, of oneTBB on its own, since its threads take from each
-  /// other by stealing only. 0 where more iterations do not make more chunks, so that all their
-  /// cost is in start_seconds; empty where it is not several times the noise.
-  std::optional<double> chunk_seconds;
-};
-
-/// The median of repeated differences, if it is several times the standard error of that median, estimated by
-/// their median absolute deviation; empty also for fewer than seven.
-std::optional<double> beyond_noise(const std::vector<double>& rounds);
-
-/// By to_string(ExecutionConfig): every schedule of this build that has threads, with its own chunk and with
-/// 1 and 16. Takes a few seconds.
-std::map<std::string, ScheduleCost> measure_schedules(int threads);
-
 /// trace.json and costs.json: harness/records.md.
 std::string trace_text(const Point& point, const LoopShape& shape, const TracedFrame& frame,
                        const Json& image);
 std::string costs_text(const Point& point, const std::string& scene_hash, const LoopShape& shape,
-                       const LoopCosts& costs, const std::map<std::string, ScheduleCost>& schedules);
+                       const LoopCosts& costs, const ScheduleCosts& schedules);
 
 }  // namespace rasterbench

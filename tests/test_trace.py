@@ -20,7 +20,7 @@ METADATA = {"schema", "model", "scene", "size", "kernel", "numeric", "fill", "ba
             "runtime", "cpu", "frame_us", "untraced_frame_us", "loops", "loop_begin_us", "loop_end_us", "loop_us", "loop_spans_us", "chunks", "chunks_an_event",
             "chunks_found_by", "git", "image"}
 COSTS = {"schema", "model", "scene_hash", "fill", "near", "isa", "techniques", "generality", "unit", "iterations", "iterations_a_cost", "columns", "tile", "size", "kernel", "numeric", "schedule", "threads", "cost_us", "stamp_us",
-         "serial_us", "dispatch_us", "start_us", "cpu", "runtime"}
+         "serial_us", "dispatch_us", "steal_us", "start_us", "cpu", "runtime"}
 
 
 def chunks(trace: dict[str, Any]) -> list[dict[str, Any]]:

@@ -20,7 +20,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scene", metavar="NAME", help="scene of that study (needed where it has several)")
     parser.add_argument("--replay", metavar="FILE", type=Path, action="append", default=[],
                         help="output of `rasterbench replay --json`, to state the error of the rules; may be repeated")
-    parser.add_argument("--steal-us", metavar="X", type=microseconds, help="cost of a steal in microseconds (default: that of a chunk)")
+    parser.add_argument("--steal-us", metavar="X", type=microseconds, help="cost of a steal in microseconds (default: as traced, else that of a chunk)")
     parser.add_argument("--out", metavar="FOLDER", type=Path, required=True, help="where to write")
 
 

@@ -85,7 +85,7 @@ def test_the_interval_of_a_law_holds_its_parameter():
 @pytest.mark.parametrize("changes, field", [
     ({"unit": "furlong"}, "unit"), ({"kernel": ...}, "kernel"), ({"iterations": 0}, "iterations"), ({"iterations": 4}, "cost_us"),
     ({"cost_us": [1, -1, 1]}, "cost_us"), ({"cost_us": [0, 0, 0]}, "cost_us"), ({"size": [1]}, "size"), ({"tile": 0}, "tile"),
-    ({"serial_us": "long"}, "serial_us"), ({"dispatch_us": {"openmp:static": -1}}, "dispatch_us.openmp:static"), ({"threads": True}, "threads"), ({"threads": 65537}, "threads"), ({"schema": ...}, "schema"),
+    ({"serial_us": "long"}, "serial_us"), ({"dispatch_us": {"openmp:static": -1}}, "dispatch_us.openmp:static"), ({"steal_us": -1}, "steal_us"), ({"threads": True}, "threads"), ({"threads": 65537}, "threads"), ({"schema": ...}, "schema"),
     ({"schema": 2}, "schema"), ({"cost_us": [1e308, 1e308, 1]}, "cost_us"), ({"isa": 3}, "isa")])
 def test_bad_fields_are_named(tmp_path, capsys, changes, field):
     path = loops.write(tmp_path / "costs.json", [1.0, 2.0, 3.0], **changes)
@@ -201,9 +201,28 @@ def test_an_unmeasured_overhead_is_said(tmp_path):
     assert any("No overhead of a chunk was measured for openmp guided (libgomp)" in line for line in whatif.cautions(m))
 
 
-@pytest.mark.parametrize("threads, words", [(1, "measured on 1 thread, where nobody contends"), (2, "measured on 2 threads, of oneTBB on one")])
-def test_the_threads_of_the_overhead_are_said(tmp_path, threads, words):
-    assert any(words in line for line in whatif.cautions(model(tmp_path, [1.0, 2.0], threads=threads)))
+@pytest.mark.parametrize("changes, words", [
+    ({"threads": 1}, "measured on 1 thread, where nobody contends"),
+    ({"threads": 2, "steal_us": None}, "measured on 2 threads, of oneTBB on one"),
+    ({"threads": 2}, "measured on 2 threads; with more"),  # an older file: oneTBB as all others
+    ({}, "not measured: that of a chunk stands for it"),
+    ({"steal_us": None}, "not measured: that of a chunk stands for it"),
+    ({"steal_us": 0.75}, "steals takes it 0.750 us more"),
+])
+def test_where_the_overheads_are_from_is_said(tmp_path, changes, words):
+    assert any(words in line for line in whatif.cautions(model(tmp_path, [1.0, 2.0], **changes)))
+
+
+def test_a_measured_steal_is_counted(tmp_path):
+    costs = np.r_[np.ones(960), np.full(64, 50.0)]
+    rule = next(r for r in whatif.RULES if (r.backend, r.schedule) == ("tbb", "simple"))
+    times = [model(tmp_path, costs, steal_us=steal).predict(rule, 1, 16).outcome.time for steal in (0.0, 5.0)]
+    assert times[1] > times[0] + 4
+
+
+def test_a_range_of_auto_costs_that_of_simple_where_it_was_not_measured(tmp_path):
+    m = model(tmp_path, [1.0, 2.0], dispatch_us={"tbb:simple": 0.3, "tbb:simple,1": 0.25, "tbb:auto": None})
+    assert m.costs.overhead("tbb", "auto", None) == (0.3, "tbb:simple") and m.costs.overhead("tbb", "auto", 2) == (0.25, "tbb:simple,1")
 
 
 def replay(tmp_path, **changes):
