@@ -13,7 +13,8 @@ base's are marked 1, the point's own on one thread s, for which the base stands 
   imbalance         P (longest - b)         waiting for the longest
   serial part       (P - 1) o_1             P - 1 threads have nothing to do outside of loops
   synchronisation   P (o - o_1)             starts, joins and barriers: time outside of loops beyond that of the base
-  other stages      P (T - R) - (T_1 - R_1) clear, geometry, resolve: no stamps of their own
+  other stages      P (T - R) - (T_1 - R_1) clear, geometry, resolve: no stamps of their own; means of the half of the samples whose frames
+                                            are nearest to the median, since the medians of stages need not add up to that of frames
 
 The residual is measured frame time that none of them holds: what the medians of several quantities leave (they come from different
 samples), time between the stages, what differs between the mean frame of a sample and its last one, which alone is stamped, and busy times
@@ -64,9 +65,11 @@ class LostTime:
         return self.base.config.backend == "serial"
 
 
-def stage(record: Record, name: str) -> float:
-    values = record.stages.get(name)
-    return 0.0 if values is None else float(np.median(values))
+def other_stages(record: Record) -> float:
+    """Milliseconds of the stages beside raster, in the half of the samples whose times are nearest to the median."""
+    times = record.samples.values
+    middle = np.argsort(np.abs(times - np.median(times)), kind="stable")[:(len(times) + 1) // 2]
+    return sum(float(np.mean(record.stages[name][middle])) for name in STAGES if name != "raster" and name in record.stages)
 
 
 def serial_of(group: Group, record: Record) -> Record | None:
@@ -99,7 +102,7 @@ def lost_time(analysis: Analysis, group: Group, record: Record) -> LostTime | No
         "dispatch": of_alone.mean - of_base.mean if base is not alone else None,
         "synchronisation": threads * (own.outside - of_base.outside),
         "serial": (threads - 1) * of_base.outside,
-        "others": sum(threads * stage(record, name) - stage(base, name) for name in STAGES if name != "raster")}
+        "others": threads * other_stages(record) - other_stages(base)}
     total, useful = threads * medians[record.id], medians[base.id]
     terms["residual"] = total - useful - sum(term for term in terms.values() if term is not None)
     return LostTime(record, base, total, useful, terms, own.per_sample, own.failed_exchanges)
