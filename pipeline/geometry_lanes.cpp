@@ -8,12 +8,12 @@
 // After foreach_target.h:
 #include <hwy/highway.h>
 
+#include "pipeline/triangle_lanes-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace rasterbench {
 namespace HWY_NAMESPACE {
 namespace {
-
-namespace hn = hwy::HWY_NAMESPACE;
 
 using Doubles = hn::ScalableTag<double>;
 using Floats = hn::Rebind<float, Doubles>;  // as many floats as there are doubles in a vector
@@ -23,39 +23,9 @@ constexpr Doubles kDoubles;
 constexpr Floats kFloats;
 constexpr hn::Rebind<std::int32_t, Doubles> kIntegers;
 
-struct LanePoint {
-  Vector x, y, z;
-};
-
 struct LaneCorner {
   Vector x, y, z, w, near_distance;
 };
-
-/// A triangle in each lane, by its corners. In memory coordinates lie 9 floats apart: taken apart as triples
-/// of coordinates, then as triples of corners, since gathers cost more than all the arithmetic on some CPUs.
-struct LaneTriangle {
-  LanePoint corners[3];
-};
-
-HWY_INLINE LaneTriangle load_triangles(const Triangle* triangles) {
-  static_assert(sizeof(Triangle) == 9 * sizeof(float));
-  constexpr std::size_t kLanes = hn::MaxLanes(kFloats);
-  const float* from = &triangles->a.x;
-  alignas(64) float x[3 * kLanes], y[3 * kLanes], z[3 * kLanes];
-  for (std::size_t i = 0; i < 3; ++i) {
-    hn::Vec<Floats> vx, vy, vz;
-    hn::LoadInterleaved3(kFloats, from + 3 * kLanes * i, vx, vy, vz);
-    hn::StoreU(vx, kFloats, x + kLanes * i);
-    hn::StoreU(vy, kFloats, y + kLanes * i);
-    hn::StoreU(vz, kFloats, z + kLanes * i);
-  }
-  hn::Vec<Floats> ax, bx, cx, ay, by, cy, az, bz, cz;
-  hn::LoadInterleaved3(kFloats, x, ax, bx, cx);
-  hn::LoadInterleaved3(kFloats, y, ay, by, cy);
-  hn::LoadInterleaved3(kFloats, z, az, bz, cz);
-  const auto wide = [](hn::Vec<Floats> v) HWY_ATTR { return hn::PromoteTo(kDoubles, v); };
-  return {{{wide(ax), wide(ay), wide(az)}, {wide(bx), wide(by), wide(bz)}, {wide(cx), wide(cy), wide(cz)}}};
-}
 
 HWY_INLINE Vector apply(const AffineRow& row, const LanePoint& p) {
   const auto times = [](double factor, Vector v) HWY_ATTR { return hn::Mul(hn::Set(kDoubles, factor), v); };
@@ -169,8 +139,7 @@ HWY_INLINE std::uint64_t transform_vector(const Triangle* triangles, std::int32_
                                           const ScreenTransform& t, const GeometryOptions& options,
                                           Slots* slots, std::int64_t first_slot, GeometryCounts& counts) {
   const SceneNeeds& needs = options.needs;
-  const LaneTriangle loaded = load_triangles(triangles);
-  const LanePoint &a = loaded.corners[0], &b = loaded.corners[1], &c = loaded.corners[2];
+  const auto [a, b, c] = load_triangles([&](std::size_t lane) { return triangles + lane; });
   Lanes lanes;
   if (needs.finite_test)
     lanes.reject(hn::Not(hn::And(hn::And(is_finite(a), is_finite(b)), is_finite(c))), counts.non_finite);

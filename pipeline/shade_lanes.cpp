@@ -12,19 +12,17 @@
 // After foreach_target.h:
 #include <hwy/highway.h>
 
+#include "pipeline/triangle_lanes-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace rasterbench {
 namespace HWY_NAMESPACE {
 namespace {
 
-namespace hn = hwy::HWY_NAMESPACE;
-
 using Doubles = hn::ScalableTag<double>;
-using Floats = hn::Rebind<float, Doubles>;
 using Integers = hn::Rebind<std::int32_t, Doubles>;
 using Vector = hn::Vec<Doubles>;
 constexpr Doubles kDoubles;
-constexpr Floats kFloats;
 constexpr Integers kIntegers;
 constexpr std::size_t kLanes = hn::MaxLanes(kDoubles);
 
@@ -38,19 +36,13 @@ HWY_INLINE hn::Vec<Integers> channel(Vector s, std::uint8_t c) {
 void shade(const Triangle* triangles, const std::uint32_t* ids, std::size_t n, const Rgb& colour,
            std::uint32_t* colours) {
   const std::size_t lanes = hn::Lanes(kDoubles);
-  alignas(64) float coordinates[9][kLanes];
   alignas(64) std::int32_t packed[kLanes];
   for (std::size_t first = 0; first < n; first += lanes) {
     const std::size_t m = std::min(lanes, n - first);
-    for (std::size_t lane = 0; lane < lanes; ++lane) {
-      const float* from = &triangles[ids[first + std::min(lane, m - 1)]].a.x;
-      for (std::size_t i = 0; i < 9; ++i) coordinates[i][lane] = from[i];
-    }
-    const auto load = [&](std::size_t i)
-                          HWY_ATTR { return hn::PromoteTo(kDoubles, hn::Load(kFloats, coordinates[i])); };
-    const Vector ax = load(0), ay = load(1), az = load(2);
-    const Vector ux = hn::Sub(load(3), ax), uy = hn::Sub(load(4), ay), uz = hn::Sub(load(5), az);
-    const Vector vx = hn::Sub(load(6), ax), vy = hn::Sub(load(7), ay), vz = hn::Sub(load(8), az);
+    const auto [a, b, c] =
+        load_triangles([&](std::size_t lane) { return triangles + ids[first + std::min(lane, m - 1)]; });
+    const Vector ux = hn::Sub(b.x, a.x), uy = hn::Sub(b.y, a.y), uz = hn::Sub(b.z, a.z);
+    const Vector vx = hn::Sub(c.x, a.x), vy = hn::Sub(c.y, a.y), vz = hn::Sub(c.z, a.z);
     const Vector nx = hn::Sub(hn::Mul(uy, vz), hn::Mul(uz, vy));
     const Vector ny = hn::Sub(hn::Mul(uz, vx), hn::Mul(ux, vz));
     const Vector nz = hn::Sub(hn::Mul(ux, vy), hn::Mul(uy, vx));
