@@ -6,7 +6,7 @@ import argparse
 import sys
 
 from . import __version__
-from .commands import COMMANDS
+from .commands import COMMANDS, pages
 from .load import InputError
 
 
@@ -34,7 +34,7 @@ def parser() -> Parser:
 def main(arguments: list[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     try:
-        return options.run(options)
+        return pages.run(options)
     except InputError as error:
         for line in getattr(error, "lines", ()):
             print(f"analysis: {line}", file=sys.stderr)

@@ -152,7 +152,8 @@ def drawings(outcome: Outcome) -> list[common.Drawing]:
     if not rows:
         return []
     limits = _limits(rows, outcome.margin)
-    pages = [rows[i:i + common.MAX_ROWS] for i in range(0, len(rows), common.MAX_ROWS)]
+    step = common.max_rows()
+    pages = [rows[i:i + step] for i in range(0, len(rows), step)]
     return [common.Drawing(common.named("ratios", page, len(pages)), "Comparison",
                            _figure(outcome, shown, limits, common.part(page, len(pages))),
                            _caption(outcome, shown, common.part(page, len(pages)))) for page, shown in enumerate(pages)]

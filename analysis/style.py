@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import io
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Iterator
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -15,6 +18,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 FULL_WIDTH = 6.9  # inches: the text width of an A4 page
 MAX_HEIGHT = 9.0  # with its caption it still fits on that page
 PNG_DPI = 150
+LINE = 1.2  # distance of lines over the size of their letters
 HEADROOM = 1.08  # a linear axis ends this much beyond its largest value
 
 # Okabe and Ito's palette without yellow (too light for a thin line on white), the darkest contrasts first.
@@ -49,6 +53,34 @@ def look(index: int) -> Look:
     return Look(COLOURS[index % 8], MARKERS[(index + index // 8) % 8])
 
 
+_page_width: ContextVar[float] = ContextVar("page_width", default=FULL_WIDTH)
+
+
+def page_width() -> float:
+    """Of the figures that are drawn now, in inches."""
+    return _page_width.get()
+
+
+def is_narrow() -> bool:
+    """Whether figures are drawn for less than a whole page."""
+    return page_width() < FULL_WIDTH - 0.1
+
+
+@contextmanager
+def page(inches: float) -> Iterator[None]:
+    """Within it figures are drawn for a column of this width. Their letters have the same size in all of them."""
+    before = _page_width.set(inches)
+    try:
+        yield
+    finally:
+        _page_width.reset(before)
+
+
+def panels_across(most: int, least: float) -> int:
+    """Panels beside each other: `most`, or as many as have `least` inches each."""
+    return max(1, min(most, int(page_width() / least + 1e-6)))
+
+
 def new_figure(width: float, height: float) -> Figure:
     # Not through pyplot: no display, no list of open figures, nothing to close.
     return Figure(figsize=(width, height))
@@ -75,15 +107,15 @@ def _width(words: str, size: float, bold: bool) -> float:
 
 
 def title(figure: Figure, words: str, top: float = 0.13) -> None:
-    """A bold line at the upper left, top inches below the edge; smaller where a long name would leave the page."""
+    """A bold line at the upper left, top inches below the edge; somewhat smaller where a long name would leave the page."""
     width, height = figure.get_size_inches()
-    size = min(8.5, 8.5 * (width - 0.2) / max(0.1, text_width([words], 8.5, bold=True)))
+    size = min(8.5, max(7.5, 8.5 * (width - 0.2) / max(0.1, text_width([words], 8.5, bold=True))))
     figure.text(0.1 / width, 1 - top / height, words, fontsize=size, weight="bold", va="center")
 
 
-def legend_columns(labels: list[str], width: float = FULL_WIDTH) -> int:
-    """As many columns as fit into the width; a handle and its gaps take about 0.55 inches."""
-    return max(1, min(len(labels), int(width / (text_width(labels, 7.5) + 0.6)))) if labels else 1
+def legend_columns(labels: list[str], width: float | None = None) -> int:
+    """As many columns as fit into the width (default: the page's); a handle and its gaps take about 0.55 inches."""
+    return max(1, min(len(labels), int((width or page_width()) / (text_width(labels, 7.5) + 0.6)))) if labels else 1
 
 
 def plain(value: float, _position: int = 0) -> str:
@@ -95,16 +127,17 @@ def number_axis(axes: Axes, low: float, high: float, log: bool, name: str = "x")
     """Ticks that say enough: on a log axis at least two labels, more where the range is short."""
     axis = axes.xaxis if name == "x" else axes.yaxis
     limits = axes.set_xlim if name == "x" else axes.set_ylim
+    room = axes.get_position().width * axes.figure.get_size_inches()[0] if name == "x" else 6.0  # inches for the labels of x
     if log:
         (axes.set_xscale if name == "x" else axes.set_yscale)("log")
         limits(low / 1.25, high * 1.25)
         decades = high / low
-        axis.set_major_locator(LogLocator(subs=(1, 2, 5) if decades < 300 else (1,), numticks=20))
+        axis.set_major_locator(LogLocator(subs=(1, 2, 5) if decades < min(300, 10 ** (room / 0.75)) else (1,), numticks=20))
         axis.set_minor_locator(NullLocator())
         axis.set_minor_formatter(NullFormatter())
     else:
         limits(0, high * HEADROOM)
-        axis.set_major_locator(MaxNLocator(6, steps=(1, 2, 2.5, 5, 10)))  # 1 is a tick where it is in sight: the base of ratios
+        axis.set_major_locator(MaxNLocator(max(2, min(6, int(room / 0.4))), steps=(1, 2, 2.5, 5, 10)))  # 1 is a tick where it is in sight: the base of ratios
     axis.set_major_formatter(FuncFormatter(plain))
 
 

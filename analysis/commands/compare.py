@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from . import studies
+from . import pages, studies
 
 NAME = "compare"
 HELP = "compare two runs, point by point"
@@ -32,6 +32,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
                              " two repeats tell much more than one")
     parser.add_argument("--json", action="store_true", help="print JSON instead of text")
     parser.add_argument("-o", "--out", metavar="FOLDER", type=Path, help="also write comparison.csv, .tex, .json and its figure")
+    pages.width(parser)
 
 
 def run(options: argparse.Namespace) -> int:

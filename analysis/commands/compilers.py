@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from . import studies
+from . import pages, studies
 
 NAME = "compilers"
 HELP = "compare programs of several compilers and flags, as scripts/compilers measured them"
@@ -14,6 +14,7 @@ DESCRIPTION = "Writes DIR/compilers.csv, .tex, .txt and compilers_ratio.png, .sv
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("directory", metavar="DIR", type=Path, help="folder that scripts/compilers wrote, with compilers.json")
+    pages.width(parser)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from . import studies
+from . import pages, studies
 
 NAME = "report"
 HELP = "write report.html, figures/ and tables/ and print three findings"
@@ -16,6 +16,7 @@ DESCRIPTION = ("Writes DIR/figures/*.svg, *.pdf, *.png, DIR/tables/*.csv, *.tex 
 def arguments(parser: argparse.ArgumentParser) -> None:
     studies.directory(parser)
     parser.add_argument("--out", metavar="FILE", type=Path, help="where to write the report (default: DIR/report.html)")
+    pages.width(parser)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from . import studies
+from . import pages, studies
 
 NAME = "stability"
 HELP = "draw the stability envelopes of numeric modes and list their breaking points"
@@ -15,6 +15,7 @@ DESCRIPTION = "Writes FOLDER/stability.png, .svg, .pdf, .csv, .tex and its capti
 def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", type=Path, help="the sweeps, one JSON object a line (stability.jsonl)")
     parser.add_argument("-o", "--out", metavar="FOLDER", type=Path, help="where to write (default: the folder of FILE)")
+    pages.width(parser)
 
 
 def run(options: argparse.Namespace) -> int:

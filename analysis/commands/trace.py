@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from . import studies
+from . import pages, studies
 
 NAME = "trace"
 HELP = "draw a traced frame: its chunks by thread, the threads' time, the heat map of its costs"
@@ -16,6 +16,7 @@ DESCRIPTION = ("Writes FOLDER/gantt, thread_shares and, where the trace has a he
 def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", type=Path, help="a trace of `rasterbench trace` (trace.json)")
     parser.add_argument("-o", "--out", metavar="FOLDER", type=Path, help="where to write (default: figures/ beside FILE)")
+    pages.width(parser)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -6,7 +6,7 @@ import argparse
 import math
 from pathlib import Path
 
-from . import studies
+from . import pages, studies
 
 NAME = "whatif"
 HELP = "predict schedules and chunks for 1 to 1024 threads from traced costs"
@@ -22,6 +22,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
                         help="output of `rasterbench replay --json`, to state the error of the rules; may be repeated")
     parser.add_argument("--steal-us", metavar="X", type=microseconds, help="cost of a steal in microseconds (default: as traced, else that of a chunk)")
     parser.add_argument("--out", metavar="FOLDER", type=Path, required=True, help="where to write")
+    pages.width(parser)
 
 
 def run(options: argparse.Namespace) -> int:

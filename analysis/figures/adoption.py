@@ -27,10 +27,12 @@ def _scaling(adoption: Adoption) -> Drawing:
     """Two panels as in the studies' figures, the legend names each base with its seconds."""
     schedules, counts = adoption.schedules, adoption.threads
     foot, tall = 0.55 + 0.17 * len(schedules), 2.45
-    height = tall + foot + 0.58
-    figure = style.new_figure(style.FULL_WIDTH, height)
-    wide = (style.FULL_WIDTH - 0.1) / 2
-    panels = [style.place(figure, 0.58 + i * wide, foot, wide - 0.68, tall) for i in range(2)]
+    across = style.panels_across(2, 2.6)
+    rows = 2 // across
+    height = rows * (tall + 0.58) + (rows - 1) * 0.4 + foot
+    figure = style.new_figure(style.page_width(), height)
+    wide = (style.page_width() - 0.1) / across
+    panels = [style.place(figure, 0.58 + i % across * wide, foot + (rows - 1 - i // across) * (tall + 0.98), wide - 0.68, tall) for i in range(2)]
     keys = []
     for i, schedule in enumerate(schedules):
         speedups = {point.threads: adoption.speedup(point) for point in adoption.line(schedule)}
@@ -48,7 +50,7 @@ def _scaling(adoption: Adoption) -> Drawing:
     panels[0].set_ylabel("speedup (times)")
     panels[1].set_ylabel("efficiency (1 = ideal)")
     style.title(figure, adoption.title)
-    figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.05 / style.FULL_WIDTH, 0.03 / height), ncol=1, borderaxespad=0.2)
+    figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.05 / style.page_width(), 0.03 / height), ncol=1, borderaxespad=0.2)
     kinds = sorted({e.kind for p in adoption.points if (e := adoption.speedup(p)).has_interval})
     return Drawing("adopt_scaling", SECTION, figure, Caption(
         f"Speedup and efficiency over threads of {adoption.title}",

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from .. import style, text, weak
+from .. import fitting, style, text, weak
 from ..captions import Caption
 from ..comparison import Analysis, Group, strategy
 from ..load import Record
@@ -17,6 +17,7 @@ from . import floors
 
 ROW_HEIGHT = 0.175  # inches
 SERIES_HEIGHT = 0.055  # of a row of several intervals that overlap
+NARROWEST = 0.8  # inches of the axes, and of their labels
 MAX_ROWS = 44  # more rows go to a further figure
 LABEL_SIZE = 7.5
 SMALL = 6  # a group with fewer timed points has no figures of its own if it can be drawn beside its like
@@ -29,6 +30,9 @@ class Drawing:
     figure: Figure
     caption: Caption
     raster: bool = False  # shown as PNG in the report: it is made of pixels anyway
+
+    def __post_init__(self) -> None:
+        fitting.fit(self.figure)
 
 
 @dataclass(frozen=True)
@@ -66,8 +70,14 @@ def most_rows(row_height: float) -> int:
     return min(MAX_ROWS, int((style.MAX_HEIGHT - 1.2) / row_height))
 
 
-def pages(blocks: list[Block], limit: int = MAX_ROWS) -> list[list[Block]]:
+def max_rows() -> int:
+    """Of one figure. In a narrow column a row may have two lines."""
+    return MAX_ROWS * 3 // 5 if style.is_narrow() else MAX_ROWS
+
+
+def pages(blocks: list[Block], limit: int | None = None) -> list[list[Block]]:
     """Blocks in as few figures as hold them, about equally filled; a block longer than a figure is divided."""
+    limit = max_rows() if limit is None else limit
     pieces = []
     for block in blocks:
         step = limit - 1
@@ -108,13 +118,22 @@ def row_frame(blocks: list[Block], title: str, unit: str, *, limits: tuple[float
     measured = blocks if every is None else [*every, *blocks]
     labels = [row.label for block in measured for row in block.rows]
     heads = [block.title for block in measured]
-    left = 0.25 + max(style.text_width(labels, LABEL_SIZE) + 0.1, style.text_width(heads, LABEL_SIZE, bold=True))
-    notes = [row.note for block in measured for row in block.rows if row.note]
-    right = 0.15 + (style.text_width(notes, 7) + 0.08 if notes else 0.0)
+    # A head has its row to itself, so that in a narrow column it may reach into the axes.
+    of_heads = 0.0 if style.is_narrow() else style.text_width(heads, LABEL_SIZE, bold=True)
+    left = 0.25 + max(style.text_width(labels, LABEL_SIZE) + 0.1, of_heads)
+    # Notes and labels become lines where they would leave less than half of a narrow page to the axes.
+    notes = {row.note: row.note for block in measured for row in block.rows if row.note}
+    if left + style.text_width(list(notes), 7) > style.page_width() / 2 and style.is_narrow():
+        notes = {note: fitting.lines(note, 7, style.page_width() / 4) for note in notes}
+    right = 0.15 + (style.text_width(list(notes.values()), 7) + 0.08 if notes else 0.0)
     columns = style.legend_columns([key.get_label() for key in keys])
     foot = 0.5 + (0.17 * -(-len(keys) // columns) if keys else 0)
-    wide, height = style.FULL_WIDTH - left - right, rows * row_height + 0.35 + foot
-    figure = style.new_figure(style.FULL_WIDTH, height)
+    most = max(NARROWEST, style.page_width() - right - NARROWEST)
+    broken = {row.label: fitting.lines(row.label, LABEL_SIZE, most - 0.15) for block in measured for row in block.rows}
+    left = min(left, most)
+    row_height = max(row_height, *(0.05 + 0.125 * (1 + words.count("\n")) for words in [*broken.values(), *notes.values()]))
+    wide, height = style.page_width() - left - right, rows * row_height + 0.35 + foot
+    figure = style.new_figure(style.page_width(), height)
     axes = style.place(figure, left, foot, wide, rows * row_height)
     axes.set_ylim(rows - 0.5, -0.5)
     axes.set_yticks([])
@@ -131,16 +150,16 @@ def row_frame(blocks: list[Block], title: str, unit: str, *, limits: tuple[float
         for row in block.rows:
             y += 1
             placed.append((y, row))
-            _label(axes, y, row.label, 0.07, color=style.FAILED if row.message else "black", ha="right")
+            _label(axes, y, broken[row.label], 0.07, color=style.FAILED if row.message else "black", ha="right")
             if row.message:
                 axes.text(0.01, y, text.shorten(row.message, int(wide / 0.05)), transform=axes.get_yaxis_transform(),
                           fontsize=7, style="italic", color=style.FAILED, va="center", clip_on=True)
             if row.note:
-                axes.annotate(row.note, (1, y), xycoords=("axes fraction", "data"), xytext=(4, 0),
+                axes.annotate(notes[row.note], (1, y), xycoords=("axes fraction", "data"), xytext=(4, 0),
                               textcoords="offset points", fontsize=7, va="center", annotation_clip=False)
         y += 1
     if keys:
-        figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.05 / style.FULL_WIDTH, 0.02 / height),
+        figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.05 / style.page_width(), 0.02 / height),
                       ncol=columns, borderaxespad=0.2, columnspacing=1.2, handletextpad=0.5)
     return Frame(figure, axes, placed)
 

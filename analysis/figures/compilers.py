@@ -17,7 +17,7 @@ from .common import Drawing
 
 SECTION = "Compilers"
 ROW = 0.24  # inches
-PANELS = 3  # beside each other
+PANELS, NARROWEST = 3, 1.5  # beside each other, and inches of one
 OPEN = "promises no bits (-ffast-math)"
 GAP, FOOT_OF_PANEL, HEAD_OF_PANEL = 0.18, 0.42, 0.3
 
@@ -47,21 +47,22 @@ def _picture(found: Comparison, panels: dict[str, list[str]], title: str, name: 
     rows = found.configurations
     cells = {key: cell for key, cell in found.cells.items() if any(key[0] in points for points in panels.values())}
     keys = _keys(executions, any(cell.marked for cell in cells.values()))
-    across, down = min(PANELS, len(panels)), -(-len(panels) // PANELS)
     left = 0.2 + style.text_width([c.name for c in rows], 7.5)
-    wide = (style.FULL_WIDTH - left - 0.12 - (across - 1) * GAP) / across
+    across = max(1, min(PANELS, len(panels), int((style.page_width() - left) / NARROWEST)))
+    down = -(-len(panels) // across)
+    wide = (style.page_width() - left - 0.12 - (across - 1) * GAP) / across
     tall = len(rows) * ROW
     columns = style.legend_columns([key.get_label() for key in keys])
     foot = 0.12 + 0.17 * -(-len(keys) // columns)
     height = 0.3 + down * (HEAD_OF_PANEL + tall + FOOT_OF_PANEL) + foot
-    figure = style.new_figure(style.FULL_WIDTH, height)
+    figure = style.new_figure(style.page_width(), height)
     for i, (panel, points) in enumerate(panels.items()):
-        bottom = foot + (down - 1 - i // PANELS) * (HEAD_OF_PANEL + tall + FOOT_OF_PANEL) + FOOT_OF_PANEL
-        axes = style.place(figure, left + (i % PANELS) * (wide + GAP), bottom, wide, tall)
+        bottom = foot + (down - 1 - i // across) * (HEAD_OF_PANEL + tall + FOOT_OF_PANEL) + FOOT_OF_PANEL
+        axes = style.place(figure, left + (i % across) * (wide + GAP), bottom, wide, tall)
         axes.set_title(panel, loc="left", pad=4, fontsize=min(8.5, 8.5 * wide / style.text_width([panel], 8.5)))
-        _panel(axes, found, points, configs, executions, labelled=i % PANELS == 0)
+        _panel(axes, found, points, configs, executions, labelled=i % across == 0)
     style.title(figure, f"Time over that of {found.base}, {title}", 0.15)
-    figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.05 / style.FULL_WIDTH, 0.02 / height), ncol=columns, borderaxespad=0.2,
+    figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.05 / style.page_width(), 0.02 / height), ncol=columns, borderaxespad=0.2,
                   columnspacing=1.2, handletextpad=0.5)
     return Drawing(name, SECTION, figure, _caption(found, list(cells.values()), title))
 
@@ -79,7 +80,7 @@ def _panel(axes: Axes, found: Comparison, points: list[str], configs: dict[str, 
             elif cell.samples is None:
                 missing = cell.reason
         if missing and configuration.name != found.base and not any(row == y for row, *_ in shown):
-            width = axes.get_position().width * style.FULL_WIDTH
+            width = axes.get_position().width * style.page_width()
             axes.text(0.02, y, text.shorten(missing, max(8, int(width / 0.058))), transform=axes.get_yaxis_transform(), fontsize=7, style="italic",
                       color=style.FAILED, va="center", clip_on=True)
     ends = [end for *_, over in shown for end in (over.value, over.low, over.high) if end is not None] + [1.0]

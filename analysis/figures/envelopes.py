@@ -13,7 +13,7 @@ from ..stability import BREAKING, SWEEPS, Envelope
 from .common import Drawing
 from .scales import round_values, said, set_ticks
 
-COLUMNS = 2
+COLUMNS, NARROWEST = 2, 2.6  # panels beside each other, and inches of one
 # Pictures are compared, not times: a mode draws the same bits on every machine.
 MACHINE = "any (modes with approximate reciprocals or contracted multiply-adds: any CPU of one type)"
 LEFT, RIGHT, HEAD = 0.72, 0.1, 0.32  # inches
@@ -27,14 +27,14 @@ LEAST = 0.8  # decades of that band
 def draw(found: list[Envelope]) -> Drawing:
     sweeps = [sweep for sweep in SWEEPS if any(e.sweep == sweep for e in found)]
     modes = list(dict.fromkeys(e.mode for e in found))
-    rows = -(-len(sweeps) // COLUMNS)
+    across = min(style.panels_across(COLUMNS, NARROWEST), len(sweeps))
+    rows = -(-len(sweeps) // across)
     keys = [_key(modes, mode) for mode in modes] + [
         Line2D([], [], color="black", marker="o", mfc="none", ms=8, mew=0.9, lw=0, label="breaking point"),
         Line2D([], [], color="black", lw=0.8, ls=(0, (4, 2)), label=f"{BREAKING:g} of the drawn")]
     labels = [key.get_label() for key in keys]
     # The legend takes the last place of the grid where that is free and large enough.
-    across = min(COLUMNS, len(sweeps))
-    wide = style.FULL_WIDTH / across - LEFT - RIGHT
+    wide = style.page_width() / across - LEFT - RIGHT
     each = 1.9 + 0.02 * len(modes)
     columns = style.legend_columns(labels, wide + LEFT)
     inside = len(sweeps) % across > 0 and ENTRY * -(-len(keys) // columns) < each + 0.3
@@ -43,13 +43,13 @@ def draw(found: list[Envelope]) -> Drawing:
     foot = 0.5 + (0 if inside else ENTRY * -(-len(keys) // columns))
     each = min(each, (style.MAX_HEIGHT - HEAD - foot) / rows - GAP)
     height = HEAD + foot + rows * (each + GAP) - GAP + 0.2
-    figure = style.new_figure(style.FULL_WIDTH, height)
+    figure = style.new_figure(style.page_width(), height)
     for i, sweep in enumerate(sweeps):
-        row, column = divmod(i, COLUMNS)
+        row, column = divmod(i, across)
         axes = style.place(figure, LEFT + column * (wide + LEFT + RIGHT), height - HEAD - 0.2 - (row + 1) * each - row * GAP, wide, each)
         _panel(axes, sweep, [e for e in found if e.sweep == sweep], modes)
     style.title(figure, "Stability envelopes: where each numeric mode breaks")
-    corner = ((LEFT + wide + RIGHT + 0.3) / style.FULL_WIDTH, (foot + each) / height) if inside else (0.05 / style.FULL_WIDTH, 0.02 / height)
+    corner = ((LEFT + wide + RIGHT + 0.3) / style.page_width(), (foot + each) / height) if inside else (0.05 / style.page_width(), 0.02 / height)
     figure.legend(handles=keys, loc="upper left" if inside else "lower left", bbox_to_anchor=corner, ncol=columns, borderaxespad=0.2,
                   columnspacing=1.0, handlelength=3.2)
     return Drawing("stability", "Stability envelopes", figure, _caption(found, modes))

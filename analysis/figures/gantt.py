@@ -58,8 +58,8 @@ def _lanes(trace: Trace) -> list[int]:
 
 def _lane_axes(trace: Trace, lanes: list[int], title: str, foot: float):
     left, height = 0.25 + style.text_width([f"thread {lanes[-1]}"], 7.5), LANE * len(lanes)
-    figure = style.new_figure(style.FULL_WIDTH, height + foot + 0.35)
-    axes = style.place(figure, left, foot, style.FULL_WIDTH - left - 0.2, height)
+    figure = style.new_figure(style.page_width(), height + foot + 0.35)
+    axes = style.place(figure, left, foot, style.page_width() - left - 0.2, height)
     axes.set_ylim(len(lanes) - 0.4, -0.6)
     axes.set_yticks(range(len(lanes)), [f"thread {lane}" for lane in lanes])
     axes.tick_params(axis="y", length=0)
@@ -70,8 +70,11 @@ def _lane_axes(trace: Trace, lanes: list[int], title: str, foot: float):
 def _gantt(trace: Trace) -> Drawing:
     begin, end = trace.span
     lanes = _lanes(trace)
-    figure, axes = _lane_axes(trace, lanes, trace.title, 0.62)
-    many = False
+    many = any((trace.chunks["thread"] == lane).sum() > MOST_BOXES for lane in lanes)
+    keys = [Patch(fc="#4A97C9", label="share of the time that lies in chunks: darker is more")] if many else \
+        [Patch(fc=PAIR[0], label="a chunk"), Patch(fc=PAIR[1], label="the next chunk"), Patch(fc="white", ec="black", lw=0.5, label="outside of chunks")]
+    columns = style.legend_columns([key.get_label() for key in keys])
+    figure, axes = _lane_axes(trace, lanes, trace.title, 0.45 + 0.17 * -(-len(keys) // columns))
     for y, lane in enumerate(lanes):
         own = trace.chunks[trace.chunks["thread"] == lane]
         low, high = own["begin"].to_numpy() - begin, own["end"].to_numpy() - begin
@@ -79,16 +82,13 @@ def _gantt(trace: Trace) -> Drawing:
             boxes = [[(a, y - 0.38), (b, y - 0.38), (b, y + 0.38), (a, y + 0.38)] for a, b in zip(low, high)]
             axes.add_collection(PolyCollection(boxes, facecolors=[PAIR[i % 2] for i in range(len(own))], linewidths=0))
         else:
-            many = True
             axes.imshow(covered(low, high, end - begin)[None, :], cmap="Blues", vmin=0, vmax=1.25, aspect="auto", interpolation="nearest",
                         extent=(0, end - begin, y + 0.38, y - 0.38))
     axes.set_ylim(len(lanes) - 0.4, -0.6)
     axes.set_xlim(0, end - begin)
     axes.xaxis.set_major_locator(MaxNLocator(7))
     axes.set_xlabel("time from the begin of the loop (µs)")
-    keys = [Patch(fc="#4A97C9", label="share of the time that lies in chunks: darker is more")] if many else \
-        [Patch(fc=PAIR[0], label="a chunk"), Patch(fc=PAIR[1], label="the next chunk"), Patch(fc="white", ec="black", lw=0.5, label="outside of chunks")]
-    figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.01, 0.0), ncol=3, columnspacing=1.0, handletextpad=0.5)
+    figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.01, 0.0), ncol=columns, columnspacing=1.0, handletextpad=0.5)
     chosen = f"{text.count(len(lanes), 'thread')} of {trace.threads} are shown. " if len(lanes) < trace.threads else ""
     joined = trace.metadata.get("chunks_an_event", 1)
     merged = f"Up to {joined} chunks in a row are one mark. " if joined != 1 else ""
@@ -132,9 +132,9 @@ def _shares(trace: Trace, threads: pd.DataFrame) -> Drawing:
 
 def _cost(trace: Trace, image: CostImage) -> Drawing:
     height, width = image.pixels.shape[:2]
-    wide = min(style.FULL_WIDTH - 1.1, (style.MAX_HEIGHT - 1.0) * width / height)
+    wide = min(style.page_width() - 1.1, (style.MAX_HEIGHT - 1.0) * width / height)
     tall = wide * height / width
-    figure = style.new_figure(style.FULL_WIDTH, tall + 0.45)
+    figure = style.new_figure(style.page_width(), tall + 0.45)
     axes = style.place(figure, 0.1, 0.1, wide, tall)
     axes.imshow(image.pixels, cmap="gray", interpolation="nearest", aspect="auto")
     axes.set_axis_off()

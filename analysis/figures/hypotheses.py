@@ -12,8 +12,8 @@ from ..comparison import Analysis
 from ..hypotheses import Verdict
 from .common import ROW_HEIGHT, Block, Drawing, Point, Row, most_rows, named, pages, part, row_frame, spread
 
-LINE = 50  # characters of a claim on a line
-MOST_LINES = 2  # a longer claim is cut off; the table has it whole
+LINE = 50  # characters of a claim on a line of a whole page's width
+MOST = 100  # characters of a claim; a longer one is cut off, and the table has it whole
 
 
 def draw(analysis: Analysis) -> Iterator[Drawing]:
@@ -29,7 +29,7 @@ def draw(analysis: Analysis) -> Iterator[Drawing]:
     keys = [Line2D([], [], color=style.COLOURS[0], marker="o", ms=4.5, lw=1.4, label="measured, with its interval"),
             Line2D([], [], color=style.COLOURS[1], marker=">", ms=5, lw=0, label="claimed: this or more"),
             Line2D([], [], color="black", lw=0.8, ls=(0, (4, 2)), label="both sides take the same time")]
-    row_height = ROW_HEIGHT * (1.8 if any("\n" in label for label in labels.values()) else 1)
+    row_height = ROW_HEIGHT * (1 + 0.8 * max(label.count("\n") for label in labels.values()))
     split = pages([block for block in blocks if block.rows], most_rows(row_height))
     for page, some in enumerate(split):
         frame = row_frame(some, f"Hypotheses{part(page, len(split))}", "time of slower / time of faster (times)" + (", log scale" if log else ""),
@@ -58,4 +58,5 @@ def draw(analysis: Analysis) -> Iterator[Drawing]:
 
 def _label(verdict: Verdict) -> str:
     words = f"H{verdict.number}  {verdict.hypothesis.claim}"
-    return "\n".join(textwrap.wrap(words, LINE, max_lines=MOST_LINES, placeholder=" …"))
+    line = int(LINE * style.page_width() / style.FULL_WIDTH)
+    return "\n".join(textwrap.wrap(words, line, max_lines=MOST // line, placeholder=" …"))

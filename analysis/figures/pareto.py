@@ -43,11 +43,11 @@ def _figure(whole: Trade, view: View, title: str):
     most = max(len(front.marks) for front in fronts)
     each = min(2.1 + 0.03 * most, (style.MAX_HEIGHT - HEAD - foot) / len(fronts) - GAP)
     height = HEAD + foot + len(fronts) * each + (len(fronts) - 1) * GAP
-    figure = style.new_figure(style.FULL_WIDTH, height)
+    figure = style.new_figure(style.page_width(), height)
     across = _across(fronts)
     for i, front in enumerate(fronts):
         bottom = foot + (len(fronts) - 1 - i) * (each + GAP)
-        axes = style.place(figure, LEFT, bottom, style.FULL_WIDTH - LEFT - RIGHT, each)
+        axes = style.place(figure, LEFT, bottom, style.page_width() - LEFT - RIGHT, each)
         names = MEANS if view.several else AXES
         _panel(axes, front, across, kernels, names[front.measure.key], last=i == len(fronts) - 1)
         if i == len(fronts) - 1:
@@ -55,7 +55,7 @@ def _figure(whole: Trade, view: View, title: str):
             stretched = "" if across.cut is None else ", stretched right of the dotted line"
             axes.set_xlabel(f"{mean} over {_base(whole, view)} (times, log scale{stretched})")
     style.title(figure, title)
-    figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.05 / style.FULL_WIDTH, 0.02 / height), ncol=columns,
+    figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.05 / style.page_width(), 0.02 / height), ncol=columns,
                   borderaxespad=0.2, columnspacing=1.2, handletextpad=0.5)
     return figure
 
@@ -86,7 +86,7 @@ def _panel(axes: Axes, front: Front, across: SpeedScale, kernels: list[str], nam
     if not last:
         axes.set_xticklabels([])
     axes.set_ylabel(name)
-    axes.yaxis.set_label_coords(-(LEFT - 0.36) / (style.FULL_WIDTH - LEFT - RIGHT), 0.5)
+    axes.yaxis.set_label_coords(-(LEFT - 0.36) / (style.page_width() - LEFT - RIGHT), 0.5)
     axes.grid(True)
     axes.axhspan(down.limits[0], down.break_at, color=style.BAND, lw=0, zorder=0)
     if across.cut is not None:

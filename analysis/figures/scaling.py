@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from .. import captions, style, text
+from .. import captions, fitting, style, text
 from ..comparison import Analysis, Group
 from ..load import Record
 from ..statistics import estimates
@@ -18,7 +18,7 @@ from .common import Block, Drawing, Row, drawn_together, bounds, dots, execution
 from .times import point, thread_series
 
 SECTION = "Speedup and efficiency"
-COLUMNS = 3
+COLUMNS, NARROWEST = 3, 1.6  # panels beside each other, and inches of one
 
 
 def draw(analysis: Analysis) -> Iterator[Drawing]:
@@ -64,10 +64,13 @@ def _summary(analysis: Analysis, group: Group, best: dict[str, tuple[str, list[R
     shown = [r for _, records in best.values() for r in records]
     floor = floors.by_threads(shown)
     foot = 0.55 + 0.17 * (len(best) + bool(floor))
-    height = 2.45 + foot + 0.58
-    figure = style.new_figure(style.FULL_WIDTH, height)
-    wide = (style.FULL_WIDTH - 0.1) / len(panels)
-    axes = [style.place(figure, 0.58 + i * wide, foot, wide - 0.68, 2.45) for i in range(len(panels))]
+    across = style.panels_across(len(panels), 2.1)
+    rows, tall = -(-len(panels) // across), 2.45 if across > 1 else 1.35
+    height = rows * (tall + 0.58) + (rows - 1) * 0.4 + foot
+    figure = style.new_figure(style.page_width(), height)
+    wide = (style.page_width() - 0.1) / across
+    axes = [style.place(figure, 0.58 + i % across * wide, foot + (rows - 1 - i // across) * (tall + 0.98), wide - 0.68, tall)
+            for i in range(len(panels))]
     keys = []
     limits: list[list[dict[int, float]]] = [[] for _ in panels]
     for i, (kernel, (execution, records)) in enumerate(best.items()):
@@ -101,7 +104,7 @@ def _summary(analysis: Analysis, group: Group, best: dict[str, tuple[str, list[R
     if floor:
         keys.append(floors.key())
     style.title(figure, group.title)
-    figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.05 / style.FULL_WIDTH, 0.03 / height), ncol=1,
+    figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.05 / style.page_width(), 0.03 / height), ncol=1,
                   borderaxespad=0.2)
     caption = captions.build(
         analysis, f"Speedup and efficiency over threads, {group.title}",
@@ -162,19 +165,20 @@ def _panels(analysis: Analysis, group: Group, every: dict[tuple[str, str], list[
     """One panel a kernel, one line an execution: what the choice of schedule does to scaling."""
     kernels = list(dict.fromkeys(kernel for kernel, _ in every))
     executions = list(dict.fromkeys(execution for _, execution in every))
-    rows = -(-len(kernels) // COLUMNS)
+    across = style.panels_across(COLUMNS, NARROWEST)
+    rows = -(-len(kernels) // across)
     columns = style.legend_columns(executions)
     shown = [r for records in every.values() for r in records]
     floor = floors.by_threads(shown)
     foot = 0.3 + 0.17 * (-(-len(executions) // columns) + bool(floor))
     each = min(1.85, (style.MAX_HEIGHT - foot - 0.35) / rows)
     height = rows * each + foot + 0.35
-    figure = style.new_figure(style.FULL_WIDTH, height)
-    wide = (style.FULL_WIDTH - 0.1) / COLUMNS
+    figure = style.new_figure(style.page_width(), height)
+    wide = (style.page_width() - 0.1) / across
     top = 0.0
     panels: list[tuple[Axes, dict[int, float]]] = []
     for i, kernel in enumerate(kernels):
-        row, column = divmod(i, COLUMNS)
+        row, column = divmod(i, across)
         axes = style.place(figure, 0.5 + column * wide, height - 0.3 - (row + 1) * each + 0.4, wide - 0.6, each - 0.75)
         lines = [(e, records) for (k, e), records in every.items() if k == kernel]
         bases = []
@@ -187,10 +191,10 @@ def _panels(analysis: Analysis, group: Group, every: dict[tuple[str, str], list[
         low, high = text.number(min(bases)), text.number(max(bases))
         # One line a panel, of the fastest base: its executions differ little on one thread.
         panels.append((axes, floors.ceilings(floor, 1000 * min(bases), counts)))
-        axes.set_title(f"{kernel}\nbase (b) {low if low == high else f'{low} to {high}'} s", loc="left", fontsize=7.5,
-                       linespacing=1.1, pad=4)
+        of_base = fitting.lines(f"base (b) {low if low == high else f'{low} to {high}'} s", 7.5, wide - 0.4)
+        axes.set_title(f"{kernel}\n{of_base}", loc="left", fontsize=7.5, linespacing=1.1, pad=4)
         axes.set_ylabel("speedup (times)" if column == 0 else "")
-        if row < rows - 1 and i + COLUMNS < len(kernels):
+        if row < rows - 1 and i + across < len(kernels):
             axes.set_xlabel("")
         top = max(top, axes.get_ylim()[1])
     for axes, ceilings in panels:
@@ -199,7 +203,7 @@ def _panels(analysis: Analysis, group: Group, every: dict[tuple[str, str], list[
     keys = [Line2D([], [], color=style.look(i).colour, marker=style.look(i).marker, ms=4, label=name)
             for i, name in enumerate(executions)] + ([floors.key()] if floor else [])
     style.title(figure, group.title)
-    figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.05 / style.FULL_WIDTH, 0.03 / height), ncol=columns,
+    figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.05 / style.page_width(), 0.03 / height), ncol=columns,
                   borderaxespad=0.2, columnspacing=1.2)
     caption = captions.build(
         analysis, f"Speedup over threads by execution, {group.title}",

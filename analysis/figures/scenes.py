@@ -14,7 +14,7 @@ from ..comparison import Analysis
 from ..load import Record
 from .common import Drawing
 
-COLUMNS = 3
+COLUMNS, NARROWEST = 3, 2.0  # pictures beside each other, and inches of one
 MAX_PIXELS = 640  # a thumbnail: the report stays light enough to mail
 
 
@@ -22,10 +22,10 @@ def draw(analysis: Analysis) -> Iterator[Drawing]:
     images = _images(analysis)
     if not images:
         return
-    columns = min(COLUMNS, len(images))
+    columns = min(style.panels_across(COLUMNS, NARROWEST), len(images))
     rows = math.ceil(len(images) / columns)
     gap, label = 0.12, 0.48
-    width = min(3.2, (style.FULL_WIDTH - gap * (columns + 1)) / columns)
+    width = min(3.2, (style.page_width() - gap * (columns + 1)) / columns)
     tallest = max(image.shape[0] / image.shape[1] for image in images.values())
     height = min(width * tallest, 3.2)
     total = rows * (height + label + gap) + gap

@@ -16,6 +16,7 @@ from .common import Drawing
 CELL_HEIGHT = 0.5  # inches
 PALE = 0.45  # share of a kernel's colour in its cells: black words stay readable on it
 TIE_HATCH = "////"
+SMALLEST = 6.0  # points; a name that would be smaller takes two lines
 
 
 def draw(analysis: Analysis) -> Iterator[Drawing]:
@@ -32,7 +33,7 @@ def _draw(analysis: Analysis, found: Map) -> Drawing:
     shown = [r for cell in found.cells.values() for r in (cell.best, cell.second) if r is not None]
     named = [strategy_map.interval(*row) for row in rows]
     left = 0.45 + style.text_width(named, 7.5)
-    wide = (style.FULL_WIDTH - left - 0.1) / len(across)
+    wide = (style.page_width() - left - 0.1) / len(across)
     # Colours for those that lead somewhere only: the first of the palette are the easiest to tell apart.
     leaders = [k for k in found.kernels if any(c.best is not None and c.best.config.kernel == k for c in found.cells.values())]
     colours = {kernel: paled(style.look(i).colour) for i, kernel in enumerate(leaders)}
@@ -43,8 +44,8 @@ def _draw(analysis: Analysis, found: Map) -> Drawing:
     per_row = style.legend_columns([key.get_label() for key in keys])
     foot = 0.55 + 0.18 * -(-len(keys) // per_row)
     height = foot + CELL_HEIGHT * len(rows) + 0.35
-    figure = style.new_figure(style.FULL_WIDTH, height)
-    axes = style.place(figure, left, foot, style.FULL_WIDTH - left - 0.1, CELL_HEIGHT * len(rows))
+    figure = style.new_figure(style.page_width(), height)
+    axes = style.place(figure, left, foot, style.page_width() - left - 0.1, CELL_HEIGHT * len(rows))
     axes.set_xlim(-0.5, len(across) - 0.5)
     axes.set_ylim(-0.5, len(rows) - 0.5)  # small triangles at the bottom, as on an axis
     axes.tick_params(length=0)
@@ -57,13 +58,16 @@ def _draw(analysis: Analysis, found: Map) -> Drawing:
                 axes.add_patch(Rectangle((x - 0.47, y - 0.46), 0.94, 0.92, facecolor="none", edgecolor="#BFBFBF", lw=0.6, ls=":"))
             else:
                 _cell(axes, x, y, cell, colours, 72 * wide * 0.8)
-    axes.set_xticks(range(len(across)), [f"{low:,}" if low == high else f"{low:,} to {high:,}" for low, high in across])
+    ticks = [f"{low:,}" if low == high else f"{low:,} to {high:,}" for low, high in across]
+    if style.text_width(ticks, 7.5) > 0.95 * wide:
+        ticks = [words.replace(" to ", "\nto ") for words in ticks]
+    axes.set_xticks(range(len(across)), ticks)
     axes.set_yticks(range(len(rows)), named)
     axes.set_xlabel("triangles")
     axes.set_ylabel("pixels per triangle, as counted")
     threads = sorted({r.config.threads for r in shown})
     style.title(figure, f"{found.heading}, {found.title}, {text.count(threads[-1], 'thread')}" if threads else found.title)
-    figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.05 / style.FULL_WIDTH, 0.03 / height), ncol=per_row,
+    figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.05 / style.page_width(), 0.03 / height), ncol=per_row,
                   borderaxespad=0.2, columnspacing=1.2)
     notes = ["A cell names the fastest kernel and how many times its time the best other kernel takes (paired median). Hatched: the best"
              " two cannot be told apart (rank test, corrected for all pictures, and paired interval); both are named, with how many more.",
@@ -109,4 +113,7 @@ def _cell(axes: Axes, x: int, y: int, cell: Cell, colours: dict[str, tuple[float
     sizes = (7.5, 7.5 if cell.lead and not tie else 6.5)
     for words, size, at in zip(lines, sizes, (0.17, -0.17)):
         fits = min(size, size * room / (72 * style.text_width([words], size, bold=at > 0)))
+        if fits < SMALLEST and "_" in words:
+            words = words.replace("_", "_\n", 1)
+            fits = min(size, size * room / (72 * style.text_width([words], size, bold=at > 0)))
         axes.text(x, y + at, words, fontsize=fits, ha="center", va="center", weight="bold" if at > 0 else "normal")

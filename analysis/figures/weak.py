@@ -13,14 +13,15 @@ from .common import Drawing, named, part
 from .scaling import curve as draw_curve
 from .scaling import seconds, thread_axis
 
-COLUMNS = 2  # panels beside each other
+COLUMNS, NARROWEST = 2, 2.6  # panels beside each other, and inches of one
 ROWS = 3  # of panels in one figure
 TALL = 2.1  # inches of a panel
 
 
 def draw(analysis: Analysis) -> Iterator[Drawing]:
     found = weak.growths(analysis)
-    split = [found[i:i + COLUMNS * ROWS] for i in range(0, len(found), COLUMNS * ROWS)]
+    step = style.panels_across(COLUMNS, NARROWEST) * ROWS
+    split = [found[i:i + step] for i in range(0, len(found), step)]
     for page, growths in enumerate(split):
         yield _draw(analysis, growths, page, len(split))
 
@@ -43,20 +44,21 @@ def _draw(analysis: Analysis, growths: list[Growth], page: int, pages: int) -> D
     keys = [Line2D([], [], color=style.look(i).colour, marker=style.look(i).marker, ms=4, label=name) for i, name in enumerate(names)]
     keys.append(Line2D([], [], color="black", lw=0.8, ls=(0, (4, 2)), label="ideal: P threads draw P times the work in the time of one"))
     columns = style.legend_columns([key.get_label() for key in keys])
-    rows = -(-len(growths) // COLUMNS)
+    across = style.panels_across(COLUMNS, NARROWEST)
+    rows = -(-len(growths) // across)
     foot = 0.45 + 0.17 * -(-len(keys) // columns)
     each = TALL + 0.55
     height = rows * each + foot + 0.25
-    figure = style.new_figure(style.FULL_WIDTH, height)
-    wide = (style.FULL_WIDTH - 0.1) / COLUMNS
+    figure = style.new_figure(style.page_width(), height)
+    wide = (style.page_width() - 0.1) / across
     top, panels = 1.1, []
     for i, growth in enumerate(growths):
-        row, column = divmod(i, COLUMNS)
+        row, column = divmod(i, across)
         axes = style.place(figure, 0.58 + column * wide, height - 0.25 - row * each - 0.3 - TALL, wide - 0.72, TALL)
         for curve in drawn[growth.slug]:
             draw_curve(axes, curve.efficiencies(analysis), names.index(curve.name))
         thread_axis(axes, growth.threads)
-        if row < rows - 1 and i + COLUMNS < len(growths):
+        if row < rows - 1 and i + across < len(growths):
             axes.set_xlabel("")
         axes.axhline(1, color="black", lw=0.8, ls=(0, (4, 2)), zorder=1)
         axes.set_title(text.shorten(f"{growth.series.kind} grow: {growth.title}", int((wide - 0.5) / 0.062)), loc="left", fontsize=7.5)
@@ -66,7 +68,7 @@ def _draw(analysis: Analysis, growths: list[Growth], page: int, pages: int) -> D
     for axes in panels:
         axes.set_ylim(0, top)
     style.title(figure, f"Weak scaling{part(page, pages)}")
-    figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.05 / style.FULL_WIDTH, 0.03 / height), ncol=columns, borderaxespad=0.2,
+    figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.05 / style.page_width(), 0.03 / height), ncol=columns, borderaxespad=0.2,
                   columnspacing=1.2)
     said = [f"{growth.title}: " + text.listing([f"{curve.label} {seconds(analysis, curve.base)}" for curve in drawn[growth.slug]], len(names))
             for growth in growths]

@@ -14,7 +14,7 @@ from ..captions import Caption, Facts
 from ..loop_costs import LoopCosts
 from ..whatif import ASKED, CAVEAT, RULES, THREADS, TIE, Comparison, Measured, Model, Rule
 from .common import Drawing
-from .schedules import CELL_HEIGHT
+from .schedules import CELL_HEIGHT, cell_number
 
 SECTION = "What if"
 DASHES = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1, 1, 1)), (0, (8, 2)), (0, (3, 1, 1, 1, 1, 1)))
@@ -34,8 +34,8 @@ def curves(model: Model, found: Comparison | None) -> Drawing:
     columns = style.legend_columns([key.get_label() for key in keys])
     foot = 0.45 + ENTRY * -(-len(keys) // columns)
     height = 0.35 + TALL + foot
-    figure = style.new_figure(style.FULL_WIDTH, height)
-    axes = style.place(figure, 0.55, foot, style.FULL_WIDTH - 0.7, TALL)
+    figure = style.new_figure(style.page_width(), height)
+    axes = style.place(figure, 0.55, foot, style.page_width() - 0.7, TALL)
     _bounds(axes, model)
     for i, (rule, best) in enumerate(shown.items()):
         axes.plot(THREADS, [model.predict(rule, best.chunk, threads).speedup for threads in THREADS], color=style.look(i).colour, ls=DASHES[i],
@@ -47,7 +47,7 @@ def curves(model: Model, found: Comparison | None) -> Drawing:
         axes.errorbar([m.prediction.threads for m in measured], [e.value for e in s], yerr=bars, fmt=look.marker, ms=7, color=look.colour, mec="black",
                       mew=1.0, ecolor="black", elinewidth=1.0, capsize=3, zorder=5)
     style.title(figure, f"What if: predicted speedup of the loop, {model.costs.name}")
-    figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.05 / style.FULL_WIDTH, 0.02 / height), ncol=columns, borderaxespad=0.2,
+    figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.05 / style.page_width(), 0.02 / height), ncol=columns, borderaxespad=0.2,
                   columnspacing=1.0, handlelength=3.2)
     return Drawing("whatif_curves", SECTION, figure, _curves_caption(model, found, points))
 
@@ -120,10 +120,15 @@ def heat_map(model: Model) -> Drawing:
     chunks = sorted({p.chunk for p in found}, key=lambda c: -1 if c is None else c)
     rows = [rule.name for rule in RULES]
     left = 0.25 + style.text_width(rows, 7)
-    wide = style.FULL_WIDTH - left - 0.1
-    height = 0.35 + len(rows) * CELL_HEIGHT + 0.98
-    figure = style.new_figure(style.FULL_WIDTH, height)
-    axes = style.place(figure, left, 0.98, wide, len(rows) * CELL_HEIGHT)
+    wide = style.page_width() - left - 0.1
+    cell = wide / len(chunks)
+    ticks = ["n/threads" if c is None else str(c) for c in chunks]
+    turned = style.text_width(ticks, 7) > 0.95 * cell
+    beside = style.page_width() - left > 4.2  # whether the keys have room beside the bar
+    foot = (0.98 if beside else 1.2) + 0.35 * turned
+    height = 0.35 + len(rows) * CELL_HEIGHT + foot
+    figure = style.new_figure(style.page_width(), height)
+    axes = style.place(figure, left, foot, wide, len(rows) * CELL_HEIGHT)
     norm = Normalize(0, 1)
     axes.set_xlim(-0.5, len(chunks) - 0.5)
     axes.set_ylim(len(rows) - 0.5, -0.5)
@@ -138,19 +143,20 @@ def heat_map(model: Model) -> Drawing:
             first = p is best[0]
             axes.add_patch(Rectangle((x - 0.46, y - 0.41), 0.92, 0.82, facecolor="none", lw=1.8 if first else 0.8, ls="-" if first else "--",
                                      edgecolor="black" if p.efficiency < 0.6 else "white", zorder=3))
-        axes.text(x, y, f"{100 * p.efficiency:.3g}", fontsize=6.5, ha="center", va="center", color="black" if p.efficiency < 0.45 else "white",
+        axes.text(x, y, cell_number(100 * p.efficiency, cell), fontsize=6.5, ha="center", va="center", color="black" if p.efficiency < 0.45 else "white",
                   weight="bold" if p is best[0] else "normal", zorder=4)
-    axes.set_xticks(range(len(chunks)), ["n/threads" if c is None else str(c) for c in chunks], fontsize=7)
+    axes.set_xticks(range(len(chunks)), ticks, fontsize=7, rotation=90 if turned else 0)
     axes.set_yticks(range(len(rows)), rows, fontsize=7)
     axes.set_xlabel("chunk or grain (iterations)", fontsize=7.5, labelpad=2)
     style.title(figure, f"What if: predicted efficiency at {threads} threads (%), {model.costs.name}")
-    bar = style.place(figure, left, 0.34, 1.8, 0.09)
+    bar = style.place(figure, left, 0.34 if beside else 0.56, min(1.8, style.page_width() - left - 0.2), 0.09)
     figure.colorbar(ScalarMappable(norm, SHADES), cax=bar, orientation="horizontal")
     bar.set_xticks([0, 0.5, 1], ["0", "50", "100"], fontsize=7)
     bar.set_xlabel("efficiency (%)", fontsize=7.5, labelpad=1)
     keys = [Patch(facecolor="#5E9DC8", edgecolor="black", lw=1.8, label="best"),
             Patch(facecolor="#5E9DC8", edgecolor="black", lw=0.8, ls="--", label=f"tie (within {text.percent(TIE)})")]
-    figure.legend(handles=keys, loc="lower left", bbox_to_anchor=((left + 2.1) / style.FULL_WIDTH, 0.2 / height), ncol=2)
+    figure.legend(handles=keys, loc="lower left", ncol=2,
+                  bbox_to_anchor=((left + 2.1 if beside else 0.05) / style.page_width(), (0.2 if beside else 0.02) / height))
     caption = Caption(
         f"Predicted efficiency of schedules and chunks at {threads} threads",
         f"Cells are the predicted speedup over the loop on one thread ({text.number(model.costs.total / 1e3)} ms), divided by {threads}, in per cent;"

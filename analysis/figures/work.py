@@ -43,15 +43,17 @@ def _draw(analysis: Analysis, growth: Growth) -> Drawing:
         keys.append(floors.key())
     per_row = style.legend_columns([key.get_label() for key in keys])
     foot = (0.5 if growth.kind == "triangles" else 0.66) + 0.17 * -(-len(keys) // per_row)
-    tall = 2.9
-    height = tall + foot + 0.5
-    figure = style.new_figure(style.FULL_WIDTH, height)
-    wide = (style.FULL_WIDTH - 0.55) / len(counts)
+    across = style.panels_across(len(counts), 2.1)
+    rows, tall = -(-len(counts) // across), 2.9 if across > 1 else 1.9
+    gap = foot - 0.17 * -(-len(keys) // per_row) + 0.15  # between rows: ticks, an axis label and a title
+    height = rows * tall + (rows - 1) * gap + foot + 0.5
+    figure = style.new_figure(style.page_width(), height)
+    wide = (style.page_width() - 0.55) / across
     estimates = [analysis.estimates[r.id] for r in shown]
     lows = [e.low if e.has_interval else e.value for e in estimates] + [v for line in floor.values() for v in line.values()]
     highs = [e.high if e.has_interval else e.value for e in estimates]
     for i, threads in enumerate(counts):
-        axes = style.place(figure, 0.58 + i * wide, foot, wide - 0.38, tall)
+        axes = style.place(figure, 0.58 + i % across * wide, foot + (rows - 1 - i // across) * (tall + gap), wide - 0.38, tall)
         style.number_axis(axes, min(lows), max(highs), log=True, name="y")
         _work_axis(axes, growth)
         _guide(axes)
@@ -63,12 +65,12 @@ def _draw(analysis: Analysis, growth: Growth) -> Drawing:
         _slopes(analysis, axes, growth.curves[threads], every)
         axes.set_title(text.count(threads, "thread"), loc="left", fontsize=8)
         axes.grid()
-        if i == 0:
+        if i % across == 0:
             axes.set_ylabel("time of a frame, median (ms), log scale")
         else:
             axes.set_yticklabels([])
     style.title(figure, f"Time against {growth.kind}: {growth.title}")
-    figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.05 / style.FULL_WIDTH, 0.03 / height), ncol=per_row,
+    figure.legend(handles=keys, loc="lower left", bbox_to_anchor=(0.05 / style.page_width(), 0.03 / height), ncol=per_row,
                   borderaxespad=0.2, columnspacing=1.2)
     notes = ["The number at the end of a line is its slope over its last step: the exponent of time over work."]
     if any(curve.is_peer for threads in counts for curve in growth.curves[threads]):
@@ -98,7 +100,7 @@ def _work_axis(axes: Axes, growth: Growth) -> None:
         # The lines of a picture name its size where they tell all sizes apart; the pixels are where the tick stands.
         labels = [f"{h}p" for h in heights] if len(set(heights)) == len(heights) else list(amounts.values())
         axes.set_xticks(list(amounts), labels, rotation=35, ha="right", rotation_mode="anchor")
-        axes.set_xlabel("pixels, log scale (ticks: lines of the picture)")
+        axes.set_xlabel("pixels, log scale (ticks: lines)")
         return
     low, high = min(amounts), max(amounts)
     decades = [10**d for d in range(int(np.floor(np.log10(low) + 0.02)), int(np.ceil(np.log10(high) - 0.02)) + 1)]

@@ -12,7 +12,7 @@ from .. import __main__ as program
 from .. import commands
 
 ROOT = Path(__file__).resolve().parents[2]
-SHARED = {"__init__", "studies"}
+SHARED = {"__init__", "pages", "studies"}
 
 
 def test_every_module_of_a_command_is_in_the_table() -> None:
