@@ -77,6 +77,27 @@ std::unique_ptr<Renderer> make_renderer(std::string_view kernel, std::string_vie
 
 void register_kernel(Kernel kernel);
 
+/// A kernel's `Strategy` in one mode, as the stages around it see it. It has
+///   void draw(const StagedTriangles<Mode>&, Visibility<Mode>, Execution&)
+/// and, if it keeps memory or knows what it did, bytes() and count() as StagedStrategy has them.
+template <NumericMode Mode, class Strategy>
+class KernelStrategy final : public StagedStrategy<Mode> {
+ public:
+  void draw(const StagedTriangles<Mode>& in, Visibility<Mode> out, Execution& execution) override {
+    strategy_.draw(in, out, execution);
+  }
+  std::size_t bytes() const override {
+    if constexpr (requires { strategy_.bytes(); }) return strategy_.bytes();
+    return 0;
+  }
+  void count([[maybe_unused]] WorkCounters& counters) const override {
+    if constexpr (requires { strategy_.count(counters); }) strategy_.count(counters);
+  }
+
+ private:
+  Strategy strategy_;
+};
+
 /// Registers `Definition`, which has a KernelInfo `kInfo` and a nested class template `Strategy<Mode>`, for
 /// every mode that the constraints on Strategy admit.
 template <class Definition>
@@ -116,7 +137,8 @@ struct KernelRegistration {
 
   template <NumericMode Mode>
   static std::unique_ptr<Renderer> make(const RendererSetup& setup) {
-    return std::make_unique<FrameRenderer<Mode, typename Definition::template Strategy<Mode>>>(setup);
+    using Strategy = typename Definition::template Strategy<Mode>;
+    return make_frame_renderer(setup, std::make_unique<KernelStrategy<Mode, Strategy>>());
   }
 };
 
