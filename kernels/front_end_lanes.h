@@ -66,7 +66,8 @@ struct FrontEnd {
     alignas(64) float x[3][kSize], y[3][kSize], d[3][kSize];
     alignas(64) std::int32_t ranks[kSize];
     std::int64_t size;
-    std::int64_t tiles;  ///< that their boxes touch, summed
+    std::int64_t tiles;   ///< that their boxes touch, summed
+    StreamBounds bounds;  ///< of all: what follows one another in the scene are neighbours in most
   } survivors;
 
   void reset(std::int64_t tiles) {

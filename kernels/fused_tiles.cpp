@@ -13,10 +13,11 @@
 // for orientations and gradients in double and for bounds, and 1.01 times for large ones (1.03 with AVX2).
 //
 // Memory: the streams take 12 bytes for each fragment of a tiny triangle and 40 bytes for each tile that
-// another triangle's box touches, in blocks of 48 entries, of each worker and tile the last one partly empty;
-// they are kept between frames. Where a scene would fill more than the budget of the streams (RendererSetup),
-// the frame is drawn in rounds: front end until it is full, tiles, and so on, with 8 bytes a pixel for what
-// was drawn so far. A budget that is too small for one batch of triangles is exceeded by it.
+// another triangle's box touches, in blocks of 48 entries, of each worker and tile the last one partly empty,
+// and 64 bytes for each block; they are kept between frames. Where a scene would fill more than the budget of
+// the streams (RendererSetup), the frame is drawn in rounds: front end until it is full, tiles, and so on,
+// with 8 bytes a pixel for what was drawn so far. A budget that is too small for one batch of triangles is
+// exceeded by it.
 #include <fmt/format.h>
 
 #include <atomic>

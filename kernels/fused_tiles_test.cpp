@@ -19,7 +19,7 @@ TEST(TileStreams, HandOutBlocksWithRoom) {
   TileStreams<3> streams;
   streams.grow(4);
   streams.reset(2);
-  EXPECT_EQ(streams.blocks(1), nullptr);
+  EXPECT_TRUE(streams.blocks(1).empty());
   constexpr int kCapacity = TileStreams<3>::kCapacity;
   for (int i = 0; i < kCapacity; ++i) {
     auto& block = streams.room(1, 1);
@@ -28,11 +28,12 @@ TEST(TileStreams, HandOutBlocksWithRoom) {
   EXPECT_EQ(streams.used_blocks(), 1);  // one entry at a time fills a block to the end
   auto& second = streams.room(1);
   EXPECT_EQ(second.size, 0);
-  EXPECT_EQ(second.next->size, kCapacity);
+  EXPECT_EQ(streams.blocks(1).front().size, kCapacity);
   second.size = kCapacity - TileStreams<3>::kOverhang;
   EXPECT_EQ(&streams.room(1), &second);
   ++second.size;  // a vector would no longer fit
-  EXPECT_NE(&streams.room(1), &second);
+  EXPECT_EQ(streams.room(1).size, 0);
+  EXPECT_EQ(streams.blocks(1).size(), 3u);
   EXPECT_EQ(streams.entries(1), 2 * kCapacity - TileStreams<3>::kOverhang + 1);
   EXPECT_EQ(streams.entries(0), 0);
 }
@@ -41,11 +42,11 @@ TEST(TileStreams, KeepTheirBlocksAndNeverMoveThem) {
   TileStreams<3> streams;
   streams.grow(1);
   streams.reset(1);
-  const auto* first = &streams.room(0);
+  const auto* first = streams.room(0).fields;
   const std::size_t bytes = streams.bytes();
   streams.grow(streams.spare_blocks() + 1);  // another chunk
   EXPECT_GT(streams.bytes(), bytes);
-  EXPECT_EQ(streams.blocks(0), first);
+  EXPECT_EQ(streams.blocks(0).front().fields, first);
   const std::int64_t spare = streams.spare_blocks();
   std::int64_t taken = 0;
   for (; streams.spare_blocks() > 0; ++taken) streams.room(0).size = TileStreams<3>::kCapacity;
@@ -53,8 +54,21 @@ TEST(TileStreams, KeepTheirBlocksAndNeverMoveThem) {
   const std::size_t all = streams.bytes();
   streams.reset(1);
   EXPECT_EQ(streams.used_blocks(), 0);
-  EXPECT_EQ(&streams.room(0), first);  // after a reset from the first block on
+  EXPECT_EQ(streams.room(0).fields, first);  // after a reset from the first block on
   EXPECT_EQ(streams.bytes(), all);
+}
+
+TEST(StreamBounds, HoldAllThatIsAdded) {
+  StreamBounds bounds = StreamBounds::none();
+  bounds.add({0.5f, {3, 4, 10, 12}});
+  bounds.add({0.25f, {5, 1, 6, 30}});
+  EXPECT_TRUE(bounds.are_known());
+  EXPECT_EQ(bounds.nearest(), 0.25f);
+  EXPECT_EQ(bounds.pixels(), (PixelBox{3, 1, 10, 30}));
+  bounds.add({});  // lies anywhere
+  EXPECT_FALSE(bounds.are_known());
+  bounds.add({0.5f, {3, 4, 10, 12}});
+  EXPECT_FALSE(bounds.are_known());
 }
 
 /// Places by which the values of sorted indices are out of order.
@@ -368,6 +382,41 @@ TEST(FusedTiles, LeaveOutThinTrianglesThatAreHidden) {
   std::vector<Triangle> slivers{wall(2)};
   for (int i = 0; i < 30; ++i) slivers.push_back({{-3, 0.01f, -1}, {3, 0.02f, -1}, {0, -0.2f, -1}});
   EXPECT_EQ(hidden_of(slivers, {.width = 64, .height = 64, .tile = 64}), 30);
+}
+
+TEST(FusedTiles, LeaveOutNeighboursThatAreHidden) {
+  // A carpet of small triangles behind a wall of two, which comes last.
+  std::vector<Triangle> triangles;
+  const auto at = [](int i) { return -3.96f + 0.22f * static_cast<float>(i); };  // 3.5 pixels apart
+  for (int y = 0; y < 36; ++y)
+    for (int x = 0; x < 36; ++x)
+      triangles.push_back({{at(x), at(y), -1}, {at(x + 1), at(y), -1}, {at(x), at(y + 1), -1}});
+  const FrameSettings settings{.width = 128, .height = 128, .tile = 64};
+  const std::int64_t alone = hidden_of(triangles, settings);
+  triangles.push_back(wall(2));
+  EXPECT_EQ(alone, 0);
+  EXPECT_GT(hidden_of(triangles, settings), 1200);  // of 1296, and some in two tiles
+  FrameSettings unordered = settings;
+  unordered.techniques.front_to_back = false;
+  EXPECT_EQ(hidden_of(triangles, unordered), 0);
+}
+
+TEST(FusedTiles, DrawNeighboursInOrderOfDepth) {
+  // Meshes with much behind them, and triangles strewn over the image, from a pixel to a tile.
+  const Scene scenes[] = {generate("teapot:triangles=3000"), generate("teapot:triangles=30000"),
+                          generate("confetti:triangles=4000,size=6"),
+                          generate("layers:triangles=20000,depth=5,order=back-to-front")};
+  for (const char* mode : kModes)
+    for (const Scene& scene : scenes)
+      for (const int tile : {8, 32, 128})
+        for (const char* techniques : {"all", "all-fragments", "all-front_to_back"}) {
+          const FrameSettings settings{.width = 203,
+                                       .height = 149,
+                                       .fill = tile == 32 ? FillRule::kClosed : FillRule::kTopLeft,
+                                       .tile = tile,
+                                       .techniques = parse_techniques(techniques, "x")};
+          EXPECT_EQ(differing(scene, settings, mode), 0) << mode << " " << tile << " " << techniques;
+        }
 }
 
 TEST(FusedTiles, OneNearTriangleDoesNotSpoilTheOrder) {

@@ -27,19 +27,10 @@ namespace rasterbench {
 namespace HWY_NAMESPACE {
 namespace {
 
-/// Fetches a block ahead of its use: blocks lie anywhere in memory.
-template <class Block>
-HWY_INLINE void fetch(const Block* block) {
-  if (block == nullptr) return;
-  const auto* bytes = reinterpret_cast<const char*>(block);
-  for (std::size_t line = 0; line < sizeof(Block); line += 64) __builtin_prefetch(bytes + line);
-}
-
 /// Draws the small triangles of a block, each in a lane: one place of all boxes at a time. A sample beyond a
 /// box is outside of an edge or beyond the image, where the tile keeps nothing.
 template <class Arithmetic>
 void draw_small(const TriangleStreams::Block& block, const TileSettings& settings, TilePixels& tile) {
-  fetch(block.next);
   const SampleGrid samples{settings.fill, settings.grid.width, settings.grid.height};
   for (std::int64_t first = 0; first < block.size; first += kWidth) {
     const IntegerMask valid = hn::FirstN(kIntegers, static_cast<std::size_t>(block.size - first));
@@ -101,6 +92,7 @@ void draw_small(const TriangleStreams::Block& block, const TileSettings& setting
         alignas(64) float depths[kLanes];
         hn::Store(clamped(hn::Add(of_row, of_column[column]), plane.low, plane.high), kFloats, depths);
         const std::int64_t step = row * tile.pitch + column;
+        tile.drawn += std::popcount(bits);
         for (; bits != 0; bits &= bits - 1) {
           const auto lane = static_cast<std::size_t>(std::countr_zero(bits));
           tile.keep(places[lane] + step, depths[lane], ranks[lane]);
@@ -110,11 +102,16 @@ void draw_small(const TriangleStreams::Block& block, const TileSettings& setting
   }
 }
 
+void draw_fragments(const FragmentStreams::Block& block, const TilePixels& tile) {
+  for (std::int64_t i = 0; i < block.size; ++i)
+    tile.keep(block.fields[2][i], as_float(block.fields[0][i]),
+              static_cast<std::int32_t>(block.fields[1][i]));
+}
+
 /// Sets up what of a block reaches the tile; triangles that the lanes cannot hold are drawn at once.
 template <class Arithmetic>
 void set_up(const TriangleStreams::Block& block, const TileSettings& settings, TilePixels& tile,
             TileTriangles& out) {
-  fetch(block.next);
   for (std::int64_t first = 0; first < block.size; first += kWidth) {
     const IntegerMask valid = hn::FirstN(kIntegers, static_cast<std::size_t>(block.size - first));
     const auto field = [&](int f) HWY_ATTR { return hn::LoadU(kCodes, block.fields[f] + first); };
@@ -164,6 +161,31 @@ void set_up(const TriangleStreams::Block& block, const TileSettings& settings, T
   }
 }
 
+/// Calls visit(block) for the blocks of one of the streams of the tile; with front_to_back roughly in order
+/// of depth, without those that are hidden when it is their turn: triangles that are neighbours in the scene
+/// lie in one block.
+template <class Visit>
+HWY_INLINE void visit_blocks(const TileTask& task, TriangleStreams FrontEnd::*streams,
+                             const TileSettings& settings, TileScratch& scratch, TilePixels& tile,
+                             Visit visit) {
+  StreamOrder& order = scratch.stream_order;
+  order.clear();
+  for (const FrontEnd* front_end : task.front_ends)
+    for (const TriangleStreams::Block& block : (front_end->*streams).blocks(task.tile)) order.add(block);
+  const bool rejects = settings.techniques.front_to_back;
+  if (rejects) order.sort();
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    if (i + 1 < order.size()) order[i + 1].fetch();
+    const StreamBounds& bounds = order[i].bounds;
+    if (rejects && bounds.are_known() && tile.hides(tile.of_image(bounds.pixels()), bounds.nearest())) {
+      scratch.hidden_entries += order[i].size;
+      continue;
+    }
+    visit(order[i]);
+    if (rejects) look_for_farthest(tile);
+  }
+}
+
 /// A tile, from streams to the picture.
 template <class Arithmetic>
 void draw(const TileTask& task, const TileSettings& settings, TileScratch& scratch,
@@ -176,34 +198,31 @@ void draw(const TileTask& task, const TileSettings& settings, TileScratch& scrat
                   .box = settings.grid.box(task.tile),
                   .side = settings.grid.side(),
                   .farthest = scratch.farthest,
-                  .untouched = 0};
-  for (const FrontEnd* front_end : task.front_ends) {
-    fetch(front_end->triangles.blocks(task.tile));
-    fetch(front_end->small_triangles.blocks(task.tile));
-    fetch(front_end->fragments.blocks(task.tile));
-  }
+                  .untouched = 0,
+                  .next_look = 0};
   start_tile(tile, settings.grid.rows_in_memory());
   if (!task.first_round) {
     clear_untouched(tile);
     load(tile, settings.grid.width, task.kept_depths, task.kept_ranks);
   }
   TileTriangles& triangles = scratch.triangles;
-  for (const FrontEnd* front_end : task.front_ends)
-    for (auto block = front_end->triangles.blocks(task.tile); block != nullptr; block = block->next) {
-      set_up<Arithmetic>(*block, settings, tile, triangles);
-      if (triangles.size >= TileTriangles::kSize) draw_triangles<Arithmetic>(scratch, settings, tile);
-    }
+  visit_blocks(task, &FrontEnd::triangles, settings, scratch, tile,
+               [&](const TriangleStreams::Block& block) HWY_ATTR {
+                 set_up<Arithmetic>(block, settings, tile, triangles);
+                 if (triangles.size >= TileTriangles::kSize)
+                   draw_triangles<Arithmetic>(scratch, settings, tile);
+               });
   draw_triangles<Arithmetic>(scratch, settings, tile);
-  for (const FrontEnd* front_end : task.front_ends)
-    for (auto block = front_end->small_triangles.blocks(task.tile); block != nullptr; block = block->next)
-      draw_small<Arithmetic>(*block, settings, tile);
-  for (const FrontEnd* front_end : task.front_ends)
-    for (auto block = front_end->fragments.blocks(task.tile); block != nullptr; block = block->next) {
-      fetch(block->next);
-      for (std::int64_t i = 0; i < block->size; ++i)
-        tile.keep(block->fields[2][i], as_float(block->fields[0][i]),
-                  static_cast<std::int32_t>(block->fields[1][i]));
+  visit_blocks(task, &FrontEnd::small_triangles, settings, scratch, tile,
+               [&](const TriangleStreams::Block& block)
+                   HWY_ATTR { draw_small<Arithmetic>(block, settings, tile); });
+  for (const FrontEnd* front_end : task.front_ends) {
+    const auto blocks = front_end->fragments.blocks(task.tile);
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      if (i + 1 < blocks.size()) blocks[i + 1].fetch();
+      draw_fragments(blocks[i], tile);
     }
+  }
   if (task.last_round) {
     resolve(tile, settings, scratch, output);
     hwy::FlushStream();

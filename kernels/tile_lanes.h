@@ -9,6 +9,7 @@
 
 #include "base/isa.h"
 #include "kernels/front_end_lanes.h"
+#include "kernels/rough_order.h"
 #include "pipeline/frame.h"
 
 namespace rasterbench {
@@ -35,6 +36,35 @@ struct TileTriangles {
 /// Large triangles are drawn by blocks of a tile, squares of this many pixels: of the largest tile, 8 x 8.
 inline constexpr int kBlockShift = 4, kBlockSide = 1 << kBlockShift, kMostBlocks = 64;
 
+/// Blocks of streams in order of depth.
+class StreamOrder {
+ public:
+  void clear() {
+    blocks_.clear();
+    nearest_.clear();
+    order_.clear();
+  }
+  void add(const TriangleStreams::Block& block) {
+    order_.push_back(static_cast<std::uint32_t>(blocks_.size()));
+    blocks_.push_back(&block);
+    nearest_.push_back(block.bounds.nearest());
+  }
+  /// The nearest first, roughly.
+  void sort() { sort_roughly(nearest_.data(), order_, unsorted_); }
+
+  std::size_t size() const { return order_.size(); }
+  const TriangleStreams::Block& operator[](std::size_t i) const { return *blocks_[order_[i]]; }
+  std::size_t bytes() const {
+    return blocks_.capacity() * sizeof(blocks_[0]) + nearest_.capacity() * sizeof(nearest_[0]) +
+           (order_.capacity() + unsorted_.capacity()) * sizeof(order_[0]);
+  }
+
+ private:
+  std::vector<const TriangleStreams::Block*> blocks_;
+  std::vector<float> nearest_;  // of each block
+  std::vector<std::uint32_t> order_, unsorted_;
+};
+
 /// What the drawing of a tile needs; one for each worker.
 struct TileScratch {
   explicit TileScratch(const TileGrid& grid)
@@ -50,7 +80,7 @@ struct TileScratch {
 
   std::size_t bytes() const {
     return depths.bytes() + ranks.bytes() + heads.bytes() + ids.bytes() + colours.bytes() +
-           (order.capacity() + unsorted.capacity()) * sizeof(order[0]);
+           (order.capacity() + unsorted.capacity()) * sizeof(order[0]) + stream_order.bytes();
   }
 
   Buffer<float>
@@ -62,7 +92,8 @@ struct TileScratch {
   alignas(64) float farthest[kMostBlocks + TriangleStreams::kOverhang];
   std::int64_t hidden_entries = 0;             ///< as in WorkCounters
   std::vector<std::uint32_t> order, unsorted;  ///< of the large triangles: their indices
-  Buffer<std::uint32_t> heads, ids, colours;   ///< of the runs of pixels that show one triangle
+  StreamOrder stream_order;
+  Buffer<std::uint32_t> heads, ids, colours;  ///< of the runs of pixels that show one triangle
 };
 
 inline constexpr std::int32_t kNoRank = 0x7fffffff;  ///< above every rank: T <= 2^31 - 1

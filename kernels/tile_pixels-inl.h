@@ -51,6 +51,7 @@ HWY_INLINE void start_tile(TilePixels& tile, int rows_in_memory) {
   const auto columns = static_cast<std::int32_t>(tile.pitch);
   clear(tile, {tile.side, 0, columns, tile.side});
   clear(tile, {0, tile.side, columns, rows_in_memory});
+  tile.next_look = std::int64_t{tile.width()} * tile.height();
   const std::int32_t blocks = tile.blocks();
   tile.untouched = ~std::uint64_t{0} >> (64 - blocks);
   // Nothing is drawn into blocks beyond the image; vectors look at what is behind the last one, too.
@@ -89,6 +90,16 @@ HWY_INLINE float farthest_depth(const TilePixels& tile, const PixelBox& box) {
     for (std::int32_t x = box.x0; x < box.x1; x += kWidth)
       most = hn::Max(most, hn::LoadU(kFloats, tile.depths + y * tile.pitch + x));
   return hn::GetLane(hn::MaxOfLanes(kFloats, most));
+}
+
+/// Looks for what is farthest in each block, once as many samples were drawn as the tile has, then twice and
+/// four times as many: what a look costs is little beside them, whether it finds something or not.
+HWY_INLINE void look_for_farthest(TilePixels& tile) {
+  if (tile.drawn < tile.next_look) return;
+  for (std::int32_t block = 0; block < tile.blocks(); ++block)
+    if ((tile.untouched >> block & 1) == 0)
+      tile.farthest[block] = farthest_depth(tile, tile.block_in_image(block));
+  tile.next_look += std::int64_t{tile.width()} * tile.height();
 }
 
 }  // namespace

@@ -22,6 +22,8 @@ struct TilePixels {
   int side;                 ///< of a tile that the image does not cut
   float* farthest;          ///< TileScratch::farthest
   std::uint64_t untouched;  ///< bit b: block b still has to be cleared
+  std::int64_t drawn = 0;   ///< samples, some more than once
+  std::int64_t next_look;   ///< at `farthest`, when so many are drawn
 
   std::int32_t width() const { return box.x1 - box.x0; }
   std::int32_t height() const { return box.y1 - box.y0; }
@@ -40,6 +42,21 @@ struct TilePixels {
   /// Those of the image.
   PixelBox block_in_image(std::int32_t number) const {
     return intersect(block(number), {0, 0, width(), height()});
+  }
+
+  /// What of a box of the image lies in the tile, counted from its first pixel.
+  PixelBox of_image(const PixelBox& pixels) const {
+    const PixelBox here = intersect(pixels, box);
+    return {here.x0 - box.x0, here.y0 - box.y0, here.x1 - box.x0, here.y1 - box.y0};
+  }
+
+  /// Whether what is shown in every block that touches `pixels`, a box that is not empty, is nearer.
+  bool hides(const PixelBox& pixels, float nearest) const {
+    const std::int32_t x1 = (pixels.x1 - 1) >> kBlockShift, y1 = (pixels.y1 - 1) >> kBlockShift;
+    for (std::int32_t y = pixels.y0 >> kBlockShift; y <= y1; ++y)
+      for (std::int32_t x = pixels.x0 >> kBlockShift; x <= x1; ++x)
+        if (!(nearest > farthest[(y << block_shift()) + x])) return false;
+    return true;
   }
 
   /// Keeps a fragment if its key is smaller.

@@ -264,7 +264,7 @@ class TriangleDrawing {
     clear_untouched(tile_);
     for (std::size_t i = 0; i < triangles_.size; ++i) {
       if (is_large(i)) continue;
-      if (rejects_ && is_hidden(i))
+      if (rejects_ && tile_.hides(box_of(triangles_, i), triangles_.nearest[i]))
         ++scratch_.hidden_entries;
       else
         draw_whole(i);
@@ -278,23 +278,10 @@ class TriangleDrawing {
   /// Triangles of few pixels hide nothing and cost less than to be ordered and taken apart.
   bool is_large(std::size_t i) const { return area_of_box(i) >= kBlockSide * kBlockSide; }
 
-  /// Whether what is shown in every block that the triangle's box touches is nearer.
-  bool is_hidden(std::size_t i) const {
-    const std::int32_t x1 = (triangles_.x1[i] - 1) >> kBlockShift, y1 = (triangles_.y1[i] - 1) >> kBlockShift;
-    for (std::int32_t y = triangles_.y0[i] >> kBlockShift; y <= y1; ++y)
-      for (std::int32_t x = triangles_.x0[i] >> kBlockShift; x <= x1; ++x)
-        if (!(triangles_.nearest[i] > tile_.farthest[(y << tile_.block_shift()) + x])) return false;
-    return true;
-  }
-
   void draw_whole(std::size_t i) {
     draw_triangle<Arithmetic>(triangles_, i, settings_.fill, tile_);
-    drawn_ += area_of_box(i);
-    // A look at every pixel is worth it once as many were drawn.
-    if (!rejects_ || drawn_ < tile_.width() * tile_.height()) return;
-    for (std::int32_t block = 0; block < tile_.blocks(); ++block)
-      tile_.farthest[block] = farthest_depth(tile_, tile_.block_in_image(block));
-    drawn_ = 0;
+    tile_.drawn += area_of_box(i);
+    if (rejects_) look_for_farthest(tile_);
   }
 
   TileScratch& scratch_;
@@ -302,7 +289,6 @@ class TriangleDrawing {
   const TileSettings& settings_;
   TilePixels& tile_;
   bool rejects_;
-  std::int32_t drawn_ = 0;  ///< pixels of boxes since the last look
 };
 
 /// Draws the triangles that are set up and empties their list.

@@ -16,7 +16,10 @@ constexpr TechniqueInfo kInfos[] = {
      &Techniques::fragments},
     {"blocks", "large triangles are tested against edges and depths, and drawn, by blocks of 16 x 16 pixels",
      &Techniques::blocks},
-    {"front_to_back", "large triangles of a tile are drawn in order of depth, and what is hidden is left out",
+    {"front_to_back",
+     "a tile draws in order of depth, large triangles one by one, others as neighbours came, and leaves out "
+     "what is "
+     "hidden",
      &Techniques::front_to_back},
     {"streaming", "colours and depths bypass the caches on their way to memory (not with isa baseline)",
      &Techniques::streaming},

@@ -12,7 +12,7 @@ namespace rasterbench {
 struct Techniques {
   bool fragments = true;      ///< tiny triangles are sampled where they are transformed
   bool blocks = true;         ///< large triangles are tested and drawn by blocks of 16 x 16 pixels
-  bool front_to_back = true;  ///< large triangles of a tile in order of depth; what is hidden is left out
+  bool front_to_back = true;  ///< a tile draws in order of depth and leaves out what is hidden
   bool streaming = true;      ///< colours and depths bypass the caches on their way to memory
   bool huge_pages = true;     ///< buffers lie in pages of 2 MiB where the system has them
 
