@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <limits>
+#include <span>
 
 #include "kernels/kernel.h"
 #include "kernels/rough_order.h"
@@ -320,22 +322,29 @@ TEST(FusedTiles, CountsItsStreams) {
   EXPECT_EQ(c.geometry_bytes->written, 40 * *c.bin_entries + 12 * *c.binned_fragments);
 }
 
+/// Both modes draw the scenes as the specification does, with these tiles and techniques, by either fill
+/// rule.
+void expect_specified(std::span<const Scene> scenes, std::initializer_list<int> tiles,
+                      std::initializer_list<const char*> techniques) {
+  for (const char* mode : kModes)
+    for (const Scene& scene : scenes)
+      for (const int tile : tiles)
+        for (const char* names : techniques) {
+          const FrameSettings settings{.width = 203,
+                                       .height = 149,
+                                       .fill = tile == 32 ? FillRule::kClosed : FillRule::kTopLeft,
+                                       .tile = tile,
+                                       .techniques = parse_techniques(names, "x")};
+          EXPECT_EQ(differing(scene, settings, mode), 0) << mode << " " << tile << " " << names;
+        }
+}
+
 TEST(FusedTiles, DrawLargeTrianglesByBlocks) {
   // Walls of the size of tiles and blocks, in both orders; triangles larger than the image; cut ones.
   const Scene scenes[] = {generate("layers:triangles=60,depth=3"),
                           generate("layers:triangles=2000,depth=3,order=back-to-front"),
                           generate("confetti:triangles=300,size=500"), much_clipped()};
-  for (const char* mode : kModes)
-    for (const Scene& scene : scenes)
-      for (const int tile : {8, 16, 32, 128})
-        for (const char* techniques : {"all", "all-front_to_back", "all-blocks", "none"}) {
-          const FrameSettings settings{.width = 203,
-                                       .height = 149,
-                                       .fill = tile == 32 ? FillRule::kClosed : FillRule::kTopLeft,
-                                       .tile = tile,
-                                       .techniques = parse_techniques(techniques, "x")};
-          EXPECT_EQ(differing(scene, settings, mode), 0) << mode << " " << tile << " " << techniques;
-        }
+  expect_specified(scenes, {8, 16, 32, 128}, {"all", "all-front_to_back", "all-blocks", "none"});
 }
 
 TEST(FusedTiles, LeaveOutWhatIsHidden) {
@@ -406,17 +415,7 @@ TEST(FusedTiles, DrawNeighboursInOrderOfDepth) {
   const Scene scenes[] = {generate("teapot:triangles=3000"), generate("teapot:triangles=30000"),
                           generate("confetti:triangles=4000,size=6"),
                           generate("layers:triangles=20000,depth=5,order=back-to-front")};
-  for (const char* mode : kModes)
-    for (const Scene& scene : scenes)
-      for (const int tile : {8, 32, 128})
-        for (const char* techniques : {"all", "all-fragments", "all-front_to_back"}) {
-          const FrameSettings settings{.width = 203,
-                                       .height = 149,
-                                       .fill = tile == 32 ? FillRule::kClosed : FillRule::kTopLeft,
-                                       .tile = tile,
-                                       .techniques = parse_techniques(techniques, "x")};
-          EXPECT_EQ(differing(scene, settings, mode), 0) << mode << " " << tile << " " << techniques;
-        }
+  expect_specified(scenes, {8, 32, 128}, {"all", "all-fragments", "all-front_to_back"});
 }
 
 TEST(FusedTiles, OneNearTriangleDoesNotSpoilTheOrder) {

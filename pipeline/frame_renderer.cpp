@@ -7,6 +7,7 @@
 namespace rasterbench {
 namespace {
 
+/// Clear and geometry, then the strategy's raster stage, then resolve.
 template <NumericMode Mode>
 class FrameRenderer final : public Renderer {
  public:
